@@ -1,0 +1,1 @@
+"""Kalman filters from filterpy, one a file, on the same contract as the estimators."""

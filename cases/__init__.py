@@ -1,0 +1,1 @@
+"""Plants whose models lack something, one a file."""

@@ -1,0 +1,1 @@
+"""Physical effects a model may lack, one a file."""

@@ -1,0 +1,1 @@
+"""Finding the effect: data in, model beside it, discrepancy, effect, corrected model."""

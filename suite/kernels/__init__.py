@@ -1,0 +1,1 @@
+"""Compiled numerics: scalar loops over arrays that the caller allocates; every kernel says which it writes."""

@@ -1,0 +1,254 @@
+"""From expressions to compiled functions: rates and outputs with their derivatives by state and parameter.
+
+The text of one module is generated, written under a name that is a hash of its content and of the versions, and
+imported; numba keeps the machine code beside it. A program may hold gated terms: parts that are only evaluated where
+`on[k]` is set, so that a library of candidate terms costs nothing while it is not looked at.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import linecache
+import os
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import sympy
+from sympy.printing.pycode import PythonCodePrinter
+
+from suite.expressions import symbol
+from suite.kernels import cache
+from suite.kernels.cache import numba
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Gate:
+    """A term that can be switched on: what it adds to rates and outputs (by index), its parameters among all."""
+
+    rates: Mapping[int, sympy.Expr] = field(default_factory=dict)
+    outputs: Mapping[int, sympy.Expr] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """Compiled `rate(t, x, u, p, on, dx, Fx, Fp)` and `output(t, x, u, p, on, y, Hx, Hp)`, which write their last three.
+
+    Shapes: x (n,), u (inputs,), p (parameters,), on (gates,), Fx (n, n), Fp (n, parameters), Hx (outputs, n),
+    Hp (outputs, parameters). Columns of Fp and Hp that belong to a gate are written only while it is on.
+    """
+
+    n: int
+    inputs: int
+    parameters: int
+    outputs_count: int
+    gates: int
+    module: ModuleType
+
+    @cached_property
+    def rate(self) -> Any:
+        return self.module.rate
+
+    @cached_property
+    def output(self) -> Any:
+        return self.module.output
+
+    def all_off(self) -> npt.NDArray[np.int64]:
+        """The gate switches, all off, (gates,)."""
+        return np.zeros(self.gates, dtype=np.int64)
+
+    def rates(self, t: float, x: Array, u: Sequence[float] | Array, p: Array) -> tuple[Array, Array, Array]:
+        """f, df/dx, df/dp at one point, all gates off."""
+        dx, Fx, Fp = np.zeros(self.n), np.zeros((self.n, self.n)), np.zeros((self.n, self.parameters))
+        self.rate(float(t), _vector(x), _vector(u), _vector(p), self.all_off(), dx, Fx, Fp)
+        return dx, Fx, Fp
+
+    def outputs(self, t: float, x: Array, u: Sequence[float] | Array, p: Array) -> tuple[Array, Array, Array]:
+        """h, dh/dx, dh/dp at one point, all gates off."""
+        ny = self.outputs_count
+        y, Hx, Hp = np.zeros(ny), np.zeros((ny, self.n)), np.zeros((ny, self.parameters))
+        self.output(float(t), _vector(x), _vector(u), _vector(p), self.all_off(), y, Hx, Hp)
+        return y, Hx, Hp
+
+
+def _vector(values: Sequence[float] | Array) -> Array:
+    return np.ascontiguousarray(values, dtype=np.float64)
+
+
+def compile_program(
+    *,
+    states: Sequence[str],
+    inputs: Sequence[str],
+    parameters: Sequence[str],
+    rates: Sequence[sympy.Expr],
+    outputs: Sequence[sympy.Expr],
+    gates: Sequence[Gate] = (),
+) -> Program:
+    """Compile rates and outputs (and gated terms) of the named states, inputs and parameters."""
+    names = (tuple(states), tuple(inputs), tuple(parameters))
+    source = "\n\n".join(
+        [
+            HEADER,
+            _function("rate", "dx, Fx, Fp", rates, [gate.rates for gate in gates], names),
+            _function("output", "y, Hx, Hp", outputs, [gate.outputs for gate in gates], names),
+        ]
+    )
+    module = _load(source)
+    return Program(len(states), len(inputs), len(parameters), len(outputs), len(gates), module)
+
+
+HEADER = '''"""Generated; safe to delete."""
+
+import math
+
+from suite.kernels.types import MODEL_FUNCTION
+from suite.kernels.cache import compile_kernel'''
+
+
+class _Printer(PythonCodePrinter):  # type: ignore[misc]
+    """Scalar code of the math module; sign, step functions and their derivatives spelled out."""
+
+    def _print_Symbol(self, expr: sympy.Expr) -> str:
+        # Declared names get a prefix, so that none can collide with the text around them.
+        return str(expr.name) if expr.name == "t" or expr.name.startswith("_c") else f"s_{expr.name}"
+
+    def _print_sign(self, expr: sympy.Expr) -> str:
+        argument = self._print(expr.args[0])
+        return f"(1.0 if {argument} > 0.0 else (-1.0 if {argument} < 0.0 else 0.0))"
+
+    def _print_Heaviside(self, expr: sympy.Expr) -> str:
+        return f"(1.0 if {self._print(expr.args[0])} > 0.0 else 0.0)"
+
+    def _print_DiracDelta(self, expr: sympy.Expr) -> str:
+        return "0.0"
+
+    def _print_Integer(self, expr: sympy.Expr) -> str:
+        return f"{int(expr)}.0"
+
+    def _print_Rational(self, expr: sympy.Expr) -> str:
+        return repr(float(expr))
+
+    def _print_Float(self, expr: sympy.Expr) -> str:
+        return repr(float(expr))
+
+    def _print_Pow(self, expr: sympy.Expr, rational: bool = False) -> str:
+        base, exponent = expr.as_base_exp()
+        text = self.parenthesize(base, 100)
+        if exponent.is_Integer and 0 < abs(int(exponent)) <= 64:
+            power = text if abs(int(exponent)) == 1 else f"{text}**{abs(int(exponent))}"
+            return power if exponent > 0 else f"(1.0/({power}))"
+        if exponent == sympy.Rational(1, 2):
+            return f"math.sqrt({self._print(base)})"
+        return f"({text}**({self._print(exponent)}))"
+
+    def _print_Abs(self, expr: sympy.Expr) -> str:
+        return f"abs({self._print(expr.args[0])})"
+
+    def _print_Min(self, expr: sympy.Expr) -> str:
+        return f"min({', '.join(self._print(a) for a in expr.args)})"
+
+    def _print_Max(self, expr: sympy.Expr) -> str:
+        return f"max({', '.join(self._print(a) for a in expr.args)})"
+
+
+def _function(
+    name: str,
+    written: str,
+    base: Sequence[sympy.Expr],
+    gated: Sequence[Mapping[int, sympy.Expr]],
+    names: tuple[tuple[str, ...], ...],
+) -> str:
+    """The text of one function: its values, Jacobian by the state and Jacobian by the parameters."""
+    value, by_x, by_p = written.split(", ")
+    X, U, P = ([symbol(s) for s in group] for group in names)
+    own = _owned(P, base, gated)
+    targets: dict[str, sympy.Expr] = {}
+    for i, expression in enumerate(base):
+        targets[f"{value}[{i}]"] = expression
+        targets |= {f"{by_x}[{i}, {j}]": _derivative(expression, s) for j, s in enumerate(X)}
+        targets |= {f"{by_p}[{i}, {j}]": _derivative(expression, s) for j, s in enumerate(P) if s not in own}
+    lines = [f"    s_{s} = {group}[{j}]" for group, part in zip("xup", (X, U, P), strict=True) for j, s in enumerate(part)]
+    lines += _assignments(targets, "=", "    ")
+    for k, terms in enumerate(gated):
+        added: dict[str, sympy.Expr] = {}
+        fresh: dict[str, sympy.Expr] = {}
+        for i, expression in terms.items():
+            added[f"{value}[{i}]"] = expression
+            added |= {f"{by_x}[{i}, {j}]": _derivative(expression, s) for j, s in enumerate(X)}
+            added |= {f"{by_p}[{i}, {j}]": _derivative(expression, s) for j, s in enumerate(P) if s not in own}
+        for i in range(len(base)):
+            part = terms.get(i, sympy.Integer(0))
+            fresh |= {f"{by_p}[{i}, {j}]": _derivative(part, s) for j, s in enumerate(P) if own.get(s) == k}
+        added = {target: part for target, part in added.items() if part != 0}
+        if added or fresh:
+            lines.append(f"    if on[{k}] != 0:")
+            lines += _assignments(added, "+=", "        ") + _assignments(fresh, "=", "        ")
+    head = f"@compile_kernel(MODEL_FUNCTION)\ndef {name}(t, x, u, p, on, {written}):"
+    return "\n".join([head, *lines, "    return"])
+
+
+def _owned(
+    P: Sequence[sympy.Symbol], base: Sequence[sympy.Expr], gated: Sequence[Mapping[int, sympy.Expr]]
+) -> dict[sympy.Symbol, int]:
+    """Parameters that one gate alone uses, with that gate: their columns cost nothing while it is off."""
+    in_base = set().union(*(expression.free_symbols for expression in base)) if base else set()
+    users: dict[sympy.Symbol, set[int]] = {}
+    for k, terms in enumerate(gated):
+        for expression in terms.values():
+            for s in expression.free_symbols:
+                users.setdefault(s, set()).add(k)
+    return {s: next(iter(users[s])) for s in P if s not in in_base and len(users.get(s, ())) == 1}
+
+
+def _derivative(expression: sympy.Expr, by: sympy.Symbol) -> sympy.Expr:
+    """The derivative almost everywhere: steps have slope zero."""
+    if not expression.has(by):
+        return sympy.Integer(0)
+    slope = sympy.diff(expression, by)
+    return slope.replace(sympy.DiracDelta, lambda *_: sympy.Integer(0))
+
+
+def _assignments(targets: Mapping[str, sympy.Expr], operator: str, indent: str) -> list[str]:
+    printer = _Printer({"fully_qualified_modules": True})
+    shared, reduced = sympy.cse(list(targets.values()), symbols=sympy.numbered_symbols("_c", real=True), order="none")
+    lines = [f"{indent}{name} = {printer.doprint(part)}" for name, part in shared]
+    return lines + [f"{indent}{t} {operator} {printer.doprint(e)}" for t, e in zip(targets, reduced, strict=True)]
+
+
+def _load(source: str) -> ModuleType:
+    """Import the generated text: from the cache folder as a real file (numba caches nothing else), or from memory."""
+    versions = f"{numba.__version__} {np.__version__} {sys.version}"
+    stem = "model_" + hashlib.sha256((source + versions).encode()).hexdigest()[:24]
+    if stem in sys.modules:
+        return sys.modules[stem]
+    place = cache.folder()
+    if place is None:
+        module = ModuleType(stem)
+        linecache.cache[f"<{stem}>"] = (len(source), None, source.splitlines(True), f"<{stem}>")
+        exec(compile(source, f"<{stem}>", "exec"), module.__dict__)
+        sys.modules[stem] = module
+        return module
+    path = place / f"{stem}.py"
+    if not path.exists():
+        with tempfile.NamedTemporaryFile("w", dir=place, suffix=".tmp", delete=False, encoding="utf-8") as handle:
+            handle.write(source)
+        os.replace(handle.name, path)
+    spec = importlib.util.spec_from_file_location(stem, path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[stem] = module
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[stem]
+        raise
+    return module

@@ -1,0 +1,18 @@
+"""The signatures of compiled functions: a model's function, and the arrays that kernels take."""
+
+from __future__ import annotations
+
+from suite.kernels.cache import numba
+
+types = numba.types
+
+REAL = types.float64
+INT = types.int64
+VECTOR = types.float64[::1]
+MATRIX = types.float64[:, ::1]
+CUBE = types.float64[:, :, ::1]
+INDICES = types.int64[::1]
+
+# rate(t, x, u, p, on, dx, Fx, Fp) and output(t, x, u, p, on, y, Hx, Hp)
+MODEL_FUNCTION = types.void(REAL, VECTOR, VECTOR, VECTOR, INDICES, VECTOR, MATRIX, MATRIX)
+MODEL = types.FunctionType(MODEL_FUNCTION)
