@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from suite.kernels.integrate import transition
-from suite.model import Model
-from suite.record import Prior, Record
+from suite.kernels.integrate import workspace
+from suite.kernels.trajectory import trajectory
+from suite.model import Model, Parameter
+from suite.record import Record
 
 Array = npt.NDArray[np.float64]
 
@@ -80,67 +81,23 @@ class Case:
         return Record(t, u, y, names=tuple(self.deficient.outputs), source=self.name), Truth(x, d, spread)
 
     def _run(self, t: Array, u: Array) -> tuple[Array, Array]:
-        """States and model error at the samples, from the true plant integrated 20 times finer than it is sampled."""
+        """States and model error at the samples, (N, n) each; the true plant is integrated 20 times finer."""
         assert self.truth is not None and self.experiment is not None
-        x = np.zeros((len(t), len(self.deficient.states)))
-        d = np.zeros_like(x)
-        x[0] = self.experiment.x0
-        linear = self.truth.linear_inputs
-        for k in range(len(t)):
-            d[k] = self.truth.rate(t[k], x[k], u[k]) - self.deficient.rate(t[k], x[k], u[k])
-            if k + 1 == len(t):
-                break
-            step = t[k + 1] - t[k]
-            if self.held:
-                pushed = _pushed(self.deficient, d[k])
-                x[k + 1] = transition(pushed.program, t[k], x[k], u[k], u[k + 1], linear, pushed.values, step)[0]
-                continue
-            state = x[k]
-            for i in range(20):
-                u0 = u[k] + linear * (i / 20) * (u[k + 1] - u[k])
-                u1 = u[k] + linear * ((i + 1) / 20) * (u[k + 1] - u[k])
-                state = transition(
-                    self.truth.program, t[k] + i * step / 20, state, u0, u1, linear, self.truth.values, step / 20
-                )[0]
-            x[k + 1] = state
-        return x, d
+        # A held case is the deficient model with a push in each rate that is renewed at every sample.
+        mover = _pushed(self.deficient) if self.held else self.truth
+        n = len(self.deficient.states)
+        X, D = np.zeros((len(t), n)), np.zeros((len(t), n))
+        X[0] = self.experiment.x0
+        models = (self.truth, self.deficient, mover)
+        widest = max(len(model.parameters) for model in models)
+        pairs = [part for model in models for part in (model.program.rate, model.values)]
+        none, T, work = np.zeros(0, dtype=np.int64), np.zeros((n, n)), workspace(n, u.shape[1], widest, 0)
+        trajectory(*pairs, int(self.held), t, u, mover.linear_inputs, none, X, D, T, work)
+        return X, D
 
 
-def _pushed(model: Model, d: Array) -> Model:
-    """The model with a constant push in each rate: parameters push_<state>."""
-    from suite.model import Parameter
-
-    for name, value in zip(tuple(model.states), d, strict=True):
-        model = model.plus(name, f"+push_{name}", {f"push_{name}": Parameter(float(value), fixed=True)})
+def _pushed(model: Model) -> Model:
+    """The model with a constant push in each rate: the last parameters, push_<state>, at zero."""
+    for name in tuple(model.states):
+        model = model.plus(name, f"+push_{name}", {f"push_{name}": Parameter(0.0, fixed=True)})
     return model
-
-
-def default_prior(model: Model, record: Record, noise: Array) -> Prior:
-    """The prior every estimator of a benchmark cell starts from, made of the model and the record alone.
-
-    x0: the known initial values, else what the first sample says of a state measured directly, else zero, with
-    P0 = 0, R, or the variance of what is measured. R: the noise as given (never below 1e-6 of the output's spread).
-    Q: (spread of the measured outputs' rate)^2 times the sampling step, for equations that may be wrong.
-    """
-    first = record.runs[0]
-    seen = ~np.isnan(first.y)
-    spread = np.array([np.std(first.y[seen[:, j], j]) for j in range(first.y.shape[1])])
-    R = np.maximum(noise, 1e-6 * np.maximum(spread, 1e-300)) ** 2
-    n = len(model.states)
-    x0, P0 = np.zeros(n), np.zeros(n)
-    for i, name in enumerate(model.states):
-        given = model.initial.get(name)
-        direct = [j for j, output in enumerate(model.outputs.values()) if output.equation.strip() == name]
-        if given is not None and not given.estimate:
-            x0[i] = given.value
-        elif direct and seen[0, direct[0]]:
-            x0[i], P0[i] = first.y[0, direct[0]], R[direct[0]]
-        else:
-            x0[i] = given.value if given is not None else 0.0
-            P0[i] = float(np.max(spread**2))
-    dt = float(np.median(first.dt))
-    pace = max(
-        float(np.sqrt(np.nanmean((np.diff(first.y[:, j]) / first.dt) ** 2))) for j in range(first.y.shape[1])
-    )
-    Q = np.array([pace**2 * dt if name in model.suspects else 0.0 for name in model.states])
-    return Prior(x0, np.diag(P0), R, Q)
