@@ -31,8 +31,8 @@ class Prior:
 class Record:
     """Measurements on a time axis of their own: t (N,), u (N, inputs), y (N, outputs), NaN in y where missing.
 
-    `starts` are the first samples of the runs; within a run time increases. There is no field for the truth, so no
-    estimator can see it. Raises DataError where shapes disagree, time does not increase, or a run has one sample.
+    `starts` are the first samples of the runs, `names` their names (none, or one a run); within a run time increases.
+    There is no field for the truth, so no estimator can see it. Raises DataError where shapes disagree, time does not increase, or a run has one sample.
     """
 
     t: Array
@@ -55,8 +55,8 @@ class Record:
             if not np.all(steps > 0):
                 at = first + int(np.argmin(steps > 0)) + 1
                 raise DataError(
-                    f"{self.source}: time does not increase at sample {at} (t = {self.t[at]:g} after {self.t[at - 1]:g}); "
-                    "sort the rows or start a new run"
+                    f"{self.source}: time does not increase at sample {at} "
+                    f"(t = {self.t[at]:g} after {self.t[at - 1]:g}); sort the rows or start a new run"
                 )
 
     @property
@@ -79,7 +79,11 @@ class Record:
     @property
     def runs(self) -> tuple[Record, ...]:
         """The runs, each as a record of its own."""
-        return tuple(self.part(first, last) for first, last in self._spans)
+        names = self.names if len(self.names) == len(self.starts) else (self.source,) * len(self.starts)
+        return tuple(
+            replace(self.part(first, last), names=(name,), source=name)
+            for (first, last), name in zip(self._spans, names, strict=True)
+        )
 
     def part(self, first: int, last: int) -> Record:
         """Samples first..last-1 of one run, as a record of its own."""
@@ -102,4 +106,5 @@ def join(records: Sequence[Record]) -> Record:
         y=np.concatenate([record.y for record in records]),
         starts=starts,
         names=tuple(name for record in records for name in record.names),
+        source=", ".join(dict.fromkeys(record.source for record in records)),
     )

@@ -1,0 +1,277 @@
+"""Tables of measured columns: CSV, parquet and MAT in, CSV out. Every defect is named with its file and place."""
+
+from __future__ import annotations
+
+import csv
+import io
+import itertools
+import os
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from suite.errors import DataError
+from suite.files import write_whole
+
+Array = npt.NDArray[np.float64]
+
+# What pandas and people write for "nothing was measured here".
+MISSING = frozenset({"", "na", "n/a", "#n/a", "nan", "-nan", "null", "none", "<na>"})
+DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+([eE][+-]?\d+)?\s*\Z")
+
+
+@dataclass(frozen=True)
+class Table:
+    """A file's columns by name; `read` gets some of them as (N,) floats, NaN where empty, `place` names a row."""
+
+    file: str
+    columns: tuple[str, ...]
+    read: Callable[[Sequence[str]], dict[str, Array]]
+    place: Callable[[int], str]
+
+
+def read_table(path: str | os.PathLike[str]) -> Table:
+    """The table in a file, its kind told by the suffix. Raises DataError."""
+    file = Path(path)
+    if file.is_dir():
+        raise DataError(f"{file}: is a folder; give the data files in it")
+    if not file.is_file():
+        raise DataError(f"{file}: no such file; check the path")
+    kinds = {
+        ".csv": _csv,
+        ".tsv": _csv,
+        ".txt": _csv,
+        ".dat": _csv,
+        ".parquet": _parquet,
+        ".pq": _parquet,
+        ".mat": _mat,
+    }
+    kind = kinds.get(file.suffix.lower())
+    if kind is None:
+        raise DataError(f"{file.name}: files {file.suffix or 'without a suffix'} are not read; save it as CSV")
+    if not file.stat().st_size:
+        raise DataError(f"{file.name}: the file is empty; expected a line of column names and rows of numbers")
+    try:
+        return kind(file)
+    except OSError as error:
+        raise DataError(f"{file.name}: cannot be read ({error.strerror or 'damaged'}); check the file") from None
+
+
+def write_csv(path: str | os.PathLike[str], columns: Mapping[str, npt.ArrayLike]) -> None:
+    """Write columns of equal length as CSV, in full precision, NaN as an empty cell; whole or not at all."""
+    arrays = [np.asarray(column, dtype=np.float64) for column in columns.values()]
+    if len({array.shape for array in arrays}) != 1 or arrays[0].ndim != 1:
+        raise DataError(f"{path}: expected columns of one length, got {[a.shape for a in arrays]}; align them")
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(columns)
+    texts = [["" if value != value else repr(value) for value in array.tolist()] for array in arrays]
+    writer.writerows(zip(*texts, strict=True))
+    write_whole(path, out.getvalue())
+
+
+def _csv(file: Path) -> Table:
+    return _Text(file).table()
+
+
+class _Text:
+    """A text table: separator, decimal sign and header are found; pandas reads the numbers.
+
+    The rows are walked in Python only where something is wrong, to say which line it is.
+    """
+
+    def __init__(self, file: Path) -> None:
+        self.name = file.name
+        self.text = _decoded(file)
+        head = self.text[:100_000].split("\n")
+        marks = 0
+        while marks < len(head) and (not head[marks].strip() or head[marks].lstrip().startswith("#")):
+            marks += 1
+        if marks == len(head):
+            raise DataError(f"{self.name}: no rows; expected a line of column names and rows of numbers")
+        # Some programs write the names as the last of the comment lines.
+        self.separator = _separator(head[marks])
+        if marks and head[marks - 1].strip() and all(_is_number(cell) for cell in self.split(head[marks])):
+            marks -= 1
+        # Lines before the names, counted from the file's start.
+        self.skipped = marks
+        names = [name.strip() for name in self.split(head[marks].lstrip("# "))]
+        while names and not names[-1]:
+            names.pop()
+        self.names = names
+        if all(_is_number(name) for name in names):
+            raise DataError(
+                f"{self.name}, line {marks + 1}: numbers where the column names should be; add a header line"
+            )
+        first = next((row for _, row in self.rows()), None)
+        if first is None:
+            raise DataError(f"{self.name}: column names and no rows; add measurements")
+        self.width = max(len(names), len(first))
+        # Some numbers of a file may be whole, so one row is not enough to tell.
+        early = [cell for _, row in itertools.islice(self.rows(), 200) for cell in row]
+        comma = self.separator != "," and any(DECIMAL_COMMA.match(cell) for cell in early)
+        self.decimal = "," if comma else "."
+        self.refuse_wide(*next(self.rows()))
+
+    def split(self, line: str) -> list[str]:
+        return next(csv.reader([line.rstrip("\r")], delimiter=self.separator, skipinitialspace=True), [])
+
+    def rows(self) -> Iterator[tuple[int, list[str]]]:
+        """Rows that hold something, each with its line number."""
+        reader = csv.reader(io.StringIO(self.text), delimiter=self.separator, skipinitialspace=True)
+        for row in reader:
+            if reader.line_num > self.skipped + 1 and not all(cell.strip().lower() in MISSING for cell in row):
+                yield reader.line_num, row
+
+    def refuse_wide(self, line: int, row: list[str]) -> None:
+        if any(cell.strip() for cell in row[len(self.names) :]):
+            hint = "; decimal commas need another separator" if self.separator == "," else ""
+            raise DataError(
+                f"{self.name}, line {line}: {len(row)} cells under {len(self.names)} column names{hint}; "
+                "give each cell a column"
+            )
+
+    def table(self) -> Table:
+        return Table(self.name, tuple(self.names), self.read, self.place)
+
+    def place(self, row: int) -> str:
+        for at, (line, _) in enumerate(self.rows()):
+            if at == row:
+                return f"line {line}"
+        return f"row {row + 1}"
+
+    def read(self, columns: Sequence[str]) -> dict[str, Array]:
+        import pandas as pd
+
+        wanted = [self.names.index(name) for name in columns]
+        try:
+            frame = pd.read_csv(
+                io.StringIO(self.text),
+                sep=self.separator,
+                decimal=self.decimal,
+                header=None,
+                names=list(range(self.width)),
+                skiprows=self.skipped + 1,
+                # All columns, as text where not wanted: with `usecols` pandas drops surplus cells silently.
+                dtype={at: np.float64 if at in wanted else str for at in range(self.width)},
+                index_col=False,
+                na_values=sorted(MISSING),
+                skipinitialspace=True,
+                float_precision="round_trip",
+                engine="c",
+            )
+        except (ValueError, pd.errors.ParserError):
+            raise self.offence(columns) from None
+        blank = frame.isna().all(axis=1)
+        if blank.any():  # the rows that spreadsheets append
+            frame = frame[~blank]
+        return {name: frame[at].to_numpy(dtype=np.float64) for name, at in zip(columns, wanted, strict=True)}
+
+    def offence(self, columns: Sequence[str]) -> DataError:
+        """The sentence for the first cell that is no number."""
+        wanted = [(name, self.names.index(name)) for name in columns]
+        for line, row in self.rows():
+            try:
+                self.refuse_wide(line, row)
+            except DataError as error:
+                return error
+            for name, at in wanted:
+                cell = row[at].strip() if at < len(row) else ""
+                if not _is_number(cell.replace(self.decimal, ".")) and cell.lower() not in MISSING:
+                    shown = cell if len(cell) <= 40 else cell[:37] + "..."
+                    return DataError(
+                        f"{self.name}, line {line}, column {name}: expected a number, got {shown!r}; "
+                        "correct it, or leave the cell empty if it is missing"
+                    )
+        return DataError(f"{self.name}: not a table of numbers; check its separators and quotes")
+
+
+def _decoded(file: Path) -> str:
+    raw = file.read_bytes()
+    encoding = "utf-16" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"
+    try:
+        text = raw.decode(encoding)
+    except UnicodeDecodeError:
+        text = raw.decode("latin-1")
+    if "\0" in text:
+        raise DataError(f"{file.name}: not a text file; save the data as CSV, parquet or MAT with the right suffix")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def _separator(line: str) -> str:
+    """The separator that splits the header most; names in quotes may hold others."""
+    bare = re.sub(r'"[^"]*"', "", line)
+    return max((",", ";", "\t"), key=bare.count)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return "_" not in text
+
+
+def _parquet(file: Path) -> Table:
+    import pyarrow
+    import pyarrow.parquet as pq
+
+    try:
+        schema = pq.read_schema(file)
+    except pyarrow.ArrowInvalid:
+        raise DataError(f"{file.name}: not a parquet file; write it again or save it as CSV") from None
+
+    def read(columns: Sequence[str]) -> dict[str, Array]:
+        table = pq.read_table(file, columns=list(dict.fromkeys(columns)))
+        return {name: _floats(file.name, name, table[name].to_pandas().to_numpy()) for name in columns}
+
+    return Table(file.name, tuple(schema.names), read, lambda row: f"row {row + 1}")
+
+
+def _mat(file: Path) -> Table:
+    from scipy.io import loadmat
+    from scipy.io.matlab import MatReadError
+
+    try:
+        contents = loadmat(file, squeeze_me=False)
+    except NotImplementedError:
+        raise DataError(f"{file.name}: a MAT file of version 7.3 is not read; save it with save(..., '-v7')") from None
+    except (MatReadError, ValueError, TypeError, KeyError, IndexError, EOFError):
+        raise DataError(f"{file.name}: not a MAT file; save it with save(..., '-v7')") from None
+    # Vectors are columns, whichever way they lie; constants and matrices beside them are no one's column.
+    vectors = {
+        name: value.reshape(-1)
+        for name, value in contents.items()
+        if isinstance(value, np.ndarray) and value.ndim == 2 and 1 == min(value.shape) < max(value.shape)
+    }
+
+    def read(columns: Sequence[str]) -> dict[str, Array]:
+        arrays = {name: _floats(file.name, name, vectors[name]) for name in columns}
+        lengths = {name: len(array) for name, array in arrays.items()}
+        if len(set(lengths.values())) > 1:
+            shown = ", ".join(f"{name} {length}" for name, length in lengths.items())
+            raise DataError(f"{file.name}: the columns differ in length ({shown}); save vectors of one length")
+        return arrays
+
+    return Table(file.name, tuple(vectors), read, lambda row: f"sample {row + 1}")
+
+
+def _floats(file: str, name: str, column: npt.NDArray[np.generic]) -> Array:
+    if column.dtype.kind in "biuf":
+        return column.astype(np.float64)
+    if column.dtype.kind in "Mm":
+        raise DataError(f"{file}, column {name}: holds dates; convert them to seconds from the start")
+    values = np.empty(len(column))
+    for row, cell in enumerate(column.tolist()):
+        try:
+            values[row] = np.nan if cell is None else float(cell)
+        except (TypeError, ValueError):
+            raise DataError(
+                f"{file}, row {row + 1}, column {name}: expected a number, got {cell!r}; "
+                "correct it, or leave the cell empty if it is missing"
+            ) from None
+    return values
