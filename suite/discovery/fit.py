@@ -1,0 +1,270 @@
+"""Maximum-likelihood fit by homotopy on the observer gain.
+
+At a large process noise the filter follows the data whatever the model says, and every parameter is easy to find; the
+noise is then lowered decade by decade to zero, where the fit is exact output error. Starting at zero fails on
+unstable, chaotic and badly wrong models.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from suite.discovery.engine import Index, Pass, Point, Problem, check_record
+from suite.discovery.library import Term
+from suite.discovery.noise import noise_variance
+from suite.model import Model
+from suite.record import Record
+
+Array = npt.NDArray[np.float64]
+
+LEVELS = (10.0, 1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """The fit at one process-noise level: where it ended, its criterion and its pass."""
+
+    q: float
+    L: float
+    point: Point
+    passed: Pass
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """A set of active candidates, fitted at every level of the homotopy (by falling q, the last is q = 0)."""
+
+    active: tuple[int, ...]
+    levels: tuple[Level, ...]
+    columns: Index
+
+    @property
+    def exact(self) -> Level:
+        """The fit at q = 0: exact simulation."""
+        return self.levels[-1]
+
+    @property
+    def best(self) -> Level:
+        """The most likely level."""
+        return min(self.levels, key=lambda level: level.L)
+
+    @property
+    def gain(self) -> float:
+        """Lambda: how much a process noise is worth, L(0) - min L."""
+        return self.exact.L - self.best.L
+
+
+def levenberg_marquardt(
+    problem: Problem, point: Point, q: float, active: Sequence[int], rounds: int, tolerance: float
+) -> Level:
+    """Minimise L at one level from `point`; returns where it ended, never worse than it began.
+
+    Columns are scaled to one; a parameter at its bound whose gradient points outwards rests.
+    """
+    columns = problem.columns(active)
+    passed = problem.run(point, q, active, columns)
+    L = problem.cost(passed, point, columns)
+    damping = 1e-3
+    mean, sd = problem.prior
+    known = np.isfinite(sd[columns])
+    low, high = problem.limits
+    edge = problem.free_x0.sum() * len(point.x0)
+    for _ in range(rounds):
+        if not passed.finite:
+            break
+        noise = max(float(np.mean(passed.e**2)), 1e-12)
+        pulls = np.where(known, 1.0 / np.where(known, sd[columns], 1.0), 0.0)
+        A = passed.J.T @ passed.J / noise
+        g = passed.J.T @ passed.e / noise
+        inner = slice(edge, None)
+        A[inner, inner] += np.diag(pulls**2)
+        g[inner] += pulls**2 * (point.p[columns] - mean[columns])
+        moving = np.ones(len(g), dtype=bool)
+        at = point.p[columns]
+        moving[inner] = ~(((at <= low[columns]) & (g[inner] > 0)) | ((at >= high[columns]) & (g[inner] < 0)))
+        scale = np.sqrt(np.maximum(np.diag(A), 1e-300))
+        moving &= np.isfinite(scale) & (np.diag(A) > 1e-280)
+        improved = False
+        theta = problem.pack(point, columns)
+        for _attempt in range(8):
+            index = np.flatnonzero(moving)
+            scaled = A[np.ix_(index, index)] / np.outer(scale[index], scale[index])
+            try:
+                step = np.linalg.solve(scaled + damping * np.eye(len(index)), -g[index] / scale[index])
+            except np.linalg.LinAlgError:
+                damping *= 10.0
+                continue
+            trial = theta.copy()
+            trial[index] += step / scale[index]
+            there = problem.unpack(trial, point, columns)
+            tried = problem.run(there, q, active, columns)
+            cost = problem.cost(tried, there, columns)
+            if cost < L:
+                improved = True
+                drop = L - cost
+                point, passed, L = there, tried, cost
+                damping = max(damping / 10.0, 1e-9)
+                break
+            damping *= 10.0
+        if not improved or drop < tolerance:
+            break
+    return Level(q, L, point, passed)
+
+
+def homotopy(
+    problem: Problem, point: Point, active: Sequence[int] = (), first: float = LEVELS[0], tolerance: float = 0.05
+) -> Hypothesis:
+    """Fit at every level from `first` down to 0, each started where the last ended; the last one converged."""
+    levels = []
+    for q in (level for level in LEVELS if level <= first):
+        last = q == 0.0
+        level = levenberg_marquardt(problem, point, q, active, 30 if last else 8, 1e-3 if last else tolerance)
+        if last and not np.isfinite(level.L) and levels:
+            # The simulation left the finite numbers: keep the last level that did not.
+            level = replace(levels[-1], q=0.0, L=np.inf)
+        levels.append(level)
+        if np.isfinite(level.L):
+            point = level.point
+    return Hypothesis(tuple(active), tuple(levels), problem.columns(active))
+
+
+def polish(problem: Problem, hypothesis: Hypothesis) -> Hypothesis:
+    """The hypothesis with its exact level converged, as comparing close rivals demands."""
+    level = levenberg_marquardt(problem, hypothesis.exact.point, 0.0, hypothesis.active, 60, 1e-5)
+    return replace(hypothesis, levels=(*hypothesis.levels[:-1], level)) if level.L <= hypothesis.exact.L else hypothesis
+
+
+def covariance(problem: Problem, level: Level, columns: Index) -> Array:
+    """Covariance of theta at a level, s^2 (J'J + prior precision)^-1; null directions get an infinite variance."""
+    noise = max(float(np.mean(level.passed.e**2)), 1e-12)
+    sd = problem.prior[1][columns]
+    pulls = np.where(np.isfinite(sd), 1.0 / np.where(np.isfinite(sd), sd, 1.0) ** 2, 0.0)
+    A = level.passed.J.T @ level.passed.J / noise
+    edge = A.shape[0] - len(columns)
+    A[edge:, edge:] += np.diag(pulls)
+    scale = np.sqrt(np.maximum(np.diag(A), 1e-300))
+    values, vectors = np.linalg.eigh(A / np.outer(scale, scale))
+    inverse = np.where(values > 1e-12, 1.0 / np.maximum(values, 1e-300), 1e12)
+    return np.asarray((vectors * inverse) @ vectors.T / np.outer(scale, scale))
+
+
+def prepare(model: Model, record: Record, terms: tuple[Term, ...] = ()) -> Problem:
+    """The problem of a model beside a record: noise, a start for the initial states, weights of the process noise."""
+    check_record(model, record)
+    R = noise_variance(model, record)
+    x0, free = _first_states(model, record)
+    problem = Problem(model, record, (), R, Point(x0, model.values), free, np.zeros(len(model.states)))
+    # The path decides the weights, the weights the path: two rounds settle it.
+    path = _rough_path(problem)
+    for _ in range(2):
+        problem = replace(problem, weights=_pace(model, record, path), path=path)
+        level = levenberg_marquardt(problem, problem.start, LEVELS[0], (), 4, 1.0)
+        if level.passed.finite:
+            path = level.passed.X
+            x0 = level.point.x0
+    problem = replace(problem, path=path, weights=_pace(model, record, path), start=Point(x0, model.values))
+    full = replace(problem, terms=terms)
+    p = np.concatenate([model.values, *(_start(full, term) for term in terms)])
+    return replace(full, start=Point(x0, p))
+
+
+def _start(problem: Problem, term: Term) -> Array:
+    """A candidate's parameters before it is fitted: coefficients zero, inner scales in the middle of their range."""
+    inner = [term.scale(name, problem.spread, problem.length) * entry.start for name, entry in term.inner.items()]
+    return np.array([0.0] * len(term.coefficients) + inner)
+
+
+def _first_states(model: Model, record: Record) -> tuple[Array, npt.NDArray[np.bool_]]:
+    """A start for each run's first state, (runs, n), and which of its components are estimated, (n,)."""
+    names = list(model.states)
+    x0 = np.zeros((len(record.starts), len(names)))
+    free = np.ones(len(names), dtype=bool)
+    measured = {output.equation.strip(): j for j, output in enumerate(model.outputs.values())}
+    for i, name in enumerate(names):
+        given = model.initial.get(name)
+        if given is not None:
+            x0[:, i] = given.value
+            free[i] = given.estimate
+            continue
+        position = next((p for p in model.definitions if model.states[p].strip() == name), None)
+        for r, run in enumerate(record.runs):
+            if name in measured:
+                x0[r, i] = run.y[:, measured[name]][~np.isnan(run.y[:, measured[name]])][0]
+            elif position in measured:
+                there = ~np.isnan(run.y[:, measured[position]])
+                t, y = run.t[there][:6], run.y[there, measured[position]][:6]
+                x0[r, i] = np.polyfit(t - t[0], y, 1)[0] if len(t) > 1 else 0.0
+    return x0, free
+
+
+def _rough_path(problem: Problem) -> Array:
+    """States at the samples before anything is fitted: measured where they are, integrated elsewhere."""
+    model, record = problem.model, problem.record
+    path = problem.run(problem.start, 0.0).X.copy()
+    for i, name in enumerate(model.states):
+        for j, output in enumerate(model.outputs.values()):
+            if output.equation.strip() == name:
+                path[:, i] = record.y[:, j]
+    for i, name in enumerate(model.states):
+        position = next((p for p in model.definitions if model.states[p].strip() == name), None)
+        if position is not None and not np.isfinite(path[:, i]).all():
+            path[:, i] = np.gradient(path[:, list(model.states).index(position)], record.t)
+    return path
+
+
+def _pace(model: Model, record: Record, path: Array) -> Array:
+    """How fast each state moves along the path, its rate's standard deviation, (n,); zero for definitions."""
+    pace = np.zeros(len(model.states))
+    bounds = record.bounds
+    for i, name in enumerate(model.states):
+        if name not in model.suspects:
+            continue
+        slopes = []
+        for first, last in zip(bounds[:-1], bounds[1:], strict=True):
+            good = np.isfinite(path[first:last, i])
+            if good.sum() > 2:
+                slopes.append(np.gradient(path[first:last, i][good], record.t[first:last][good]))
+        all_slopes = np.concatenate(slopes) if slopes else np.zeros(1)
+        pace[i] = float(np.sqrt(np.mean(all_slopes**2)))
+        if not np.isfinite(pace[i]) or pace[i] == 0.0:
+            pace[i] = 1.0 / max(float(record.t[-1] - record.t[0]), 1e-300)
+    return pace
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A refitted model: its parameters as (value, sd), the simulated outputs, and what it was fitted to."""
+
+    model: Model
+    parameters: Mapping[str, tuple[float, float]]
+    x0: Array
+    Y: Array
+    sigma: Array
+    L: float
+    problem: Problem = field(repr=False)
+    hypothesis: Hypothesis = field(repr=False)
+
+
+def fit(model: Model, record: Record) -> Fit:
+    """Maximum-likelihood fit of a model's free parameters and initial states to a record; raises DataError."""
+    problem = prepare(model, record)
+    return summarise(problem, polish(problem, homotopy(problem, problem.start)))
+
+
+def summarise(problem: Problem, hypothesis: Hypothesis) -> Fit:
+    """What a fitted hypothesis says of the model's own parameters."""
+    exact = hypothesis.exact
+    columns = hypothesis.columns
+    variances = np.diag(covariance(problem, exact, columns))[len(exact.passed.J[0]) - len(columns) :]
+    sds = dict(zip(columns.tolist(), np.sqrt(np.maximum(variances, 0.0)), strict=True))
+    names = list(problem.model.parameters)
+    parameters = {name: (float(exact.point.p[j]), float(sds.get(j, 0.0))) for j, name in enumerate(names)}
+    scale = float(np.sqrt(np.mean(exact.passed.e**2)))
+    return Fit(
+        problem.model.with_values({name: value for name, (value, _) in parameters.items()}),
+        parameters, exact.point.x0, exact.passed.Y, np.sqrt(problem.R) * scale, exact.L, problem, hypothesis,
+    )  # fmt: skip
