@@ -58,7 +58,9 @@ class Problem:
     start: Point
     free_x0: npt.NDArray[np.bool_]
     weights: Array = field(default_factory=lambda: np.zeros(0))
+    path: Array = field(default_factory=lambda: np.zeros((1, 0)))
     substeps: int = 1
+    scale: float | None = None  # the noise's variance in units of R, where it is known and not profiled
 
     @cached_property
     def _extension(self) -> tuple[tuple[str, ...], tuple[codegen.Gate, ...]]:
@@ -122,8 +124,6 @@ class Problem:
         for i, name in enumerate(self.model.states):
             ranges[name] = float(np.ptp(self.path[:, i])) or 1.0
         return ranges
-
-    path: Array = field(default_factory=lambda: np.zeros((1, 0)))
 
     @property
     def length(self) -> float:
@@ -201,8 +201,13 @@ class Problem:
         with np.errstate(invalid="ignore"):
             pulls = ((point.p - mean) / sd)[columns]
         pull = float((pulls[np.isfinite(sd[columns])] ** 2).sum())
-        noise = max(float(np.mean(passed.e**2)), SMALLEST)
-        return len(passed.e) * np.log(noise) + passed.logs + pull
+        if self.scale is not None:
+            return float((passed.e**2).sum()) / self.scale + passed.logs + pull
+        return len(passed.e) * np.log(self.noise(passed)) + passed.logs + pull
+
+    def noise(self, passed: Pass) -> float:
+        """The noise's variance in units of R: given, or the mean squared error."""
+        return self.scale if self.scale is not None else max(float(np.mean(passed.e**2)), SMALLEST)
 
     def pack(self, point: Point, columns: Index) -> Array:
         """theta of a point."""

@@ -76,7 +76,7 @@ def levenberg_marquardt(
     for _ in range(rounds):
         if not passed.finite:
             break
-        noise = max(float(np.mean(passed.e**2)), 1e-12)
+        noise = problem.noise(passed)
         pulls = np.where(known, 1.0 / np.where(known, sd[columns], 1.0), 0.0)
         A = passed.J.T @ passed.J / noise
         g = passed.J.T @ passed.e / noise
@@ -140,7 +140,7 @@ def polish(problem: Problem, hypothesis: Hypothesis) -> Hypothesis:
 
 def covariance(problem: Problem, level: Level, columns: Index) -> Array:
     """Covariance of theta at a level, s^2 (J'J + prior precision)^-1; null directions get an infinite variance."""
-    noise = max(float(np.mean(level.passed.e**2)), 1e-12)
+    noise = problem.noise(level.passed)
     sd = problem.prior[1][columns]
     pulls = np.where(np.isfinite(sd), 1.0 / np.where(np.isfinite(sd), sd, 1.0) ** 2, 0.0)
     A = level.passed.J.T @ level.passed.J / noise

@@ -28,13 +28,14 @@ STARTS = (1.0, 0.3, 3.0)  # multiples of an inner scale's start that are scored
 
 @dataclass(frozen=True, eq=False)
 class Score:
-    """One candidate's score at its best level: LM, the coefficients it suggests, inner scales, and the level."""
+    """One candidate's score at its best level: LM, the parameters it suggests (coefficients, inner scales), the level,
+    and the length of its projected column in noise sds a unit of its coefficient: LM = (c length)^2."""
 
     k: int
     LM: float
     p: Array
     q: float
-    weight: float
+    length: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +48,7 @@ class Search:
     absorbed: tuple[int, ...] = ()
     frequencies: int = 1
     scores: tuple[Score, ...] = field(default=())
+    seconds: float = 0.0
 
     def criterion(self, hypothesis: Hypothesis, level: Level | None = None) -> float:
         """EBIC = L + k ln N + 2 (number of terms) ln(library size), k counting inner scales."""
@@ -70,7 +72,7 @@ def search(problem: Problem) -> Search:
     absorbed = _absorbed(problem, base)
     scores = score(problem, base, skip=absorbed)
     found = Search(problem, base, (), absorbed, len(frequencies), tuple(scores))
-    fitted = [refit(problem, base, (s.k,), s) for s in scores[:REFITTED]]
+    fitted = [refit(problem, base, (s.k,), s) for s in scores[:REFITTED] if s.LM > 0]
     fitted = _converged(found, fitted)
     found = replace(found, fitted=tuple(fitted))
     if fitted and needs_more(found, min(fitted, key=found.criterion)):
@@ -84,14 +86,14 @@ def needs_more(found: Search, best: Hypothesis) -> bool:
 
 
 def score(
-    problem: Problem, hypothesis: Hypothesis, skip: Iterable[int] = (), around: Sequence[float] | None = None
+    problem: Problem, hypothesis: Hypothesis, skip: Iterable[int] = (), exact: bool = False
 ) -> list[Score]:
-    """All candidates that are not active, best first, scored at the most likely level and a decade either side."""
+    """All candidates that are not active, best first, at the most likely level and a decade either side (or at q = 0)."""
     left_out = {*skip, *hypothesis.active}
     best: dict[int, Score] = {}
     levels = [level for level in hypothesis.levels if np.isfinite(level.L)]
     at = min(range(len(levels)), key=lambda i: levels[i].L)
-    for level in levels[max(at - 1, 0) : at + 2]:
+    for level in [levels[-1]] if exact else levels[max(at - 1, 0) : at + 2]:
         for entry in _scores_at(problem, hypothesis, level, left_out):
             if entry.k not in best or entry.LM > best[entry.k].LM:
                 best[entry.k] = entry
@@ -137,7 +139,7 @@ def _score_pass(
         return
     width = passed.J.shape[1] - (len(columns) - len(own))
     r, B, _ = _projected(problem, passed, own, width)
-    noise = max(float(np.mean(passed.e**2)), 1e-12)
+    noise = problem.noise(passed)
     at = 0
     for k in chosen:
         count = len(coefficient_places[k])
@@ -149,8 +151,8 @@ def _score_pass(
             continue
         scale = np.sqrt(norms)
         c = -np.linalg.lstsq(gram / np.outer(scale, scale), b.T @ r / scale, rcond=1e-10)[0] / scale
-        if problem.terms[k].effect.sign and c[0] < 0:
-            continue
+        if problem.terms[k].effect.sign:
+            c = np.maximum(c, 0.0)
         start = p.copy()
         start[coefficient_places[k]] = c
         LM = float(c @ gram @ c) / noise
@@ -163,7 +165,7 @@ def _projected(problem: Problem, passed: Pass, own: Index, width: int, prior: bo
     Returns r (M + priors,), B (M + priors, candidates), and the candidates' columns before, (M, candidates).
     """
     A, C = passed.J[:, :width], passed.J[:, width:]
-    noise = max(float(np.mean(passed.e**2)), 1e-12)
+    noise = problem.noise(passed)
     sd = problem.prior[1][own]
     rows = np.zeros((len(own), width))
     informed = np.isfinite(sd) if prior else np.zeros(len(sd), dtype=bool)

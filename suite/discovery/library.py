@@ -8,7 +8,7 @@ unit of its level says so.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -182,16 +182,14 @@ def _kelvin(model: Model, equation: str, level: str | None) -> float | None:
     return 0.0 if value > 200 else 273.15
 
 
-def grown(model: Model, terms: tuple[Term, ...], values: Mapping[str, float], sds: Mapping[str, float]) -> Model:
-    """The model with the terms added and their parameters at `values`; the library's names are made unique."""
-    for term in terms:
-        renamed = {}
-        for name in term.names:
-            fresh = _Names(model).fresh(name.split("__")[-1])
-            renamed[name] = fresh
+def grown(model: Model, terms: Sequence[Term], values: Sequence[Mapping[str, float]]) -> Model:
+    """The model with the terms added, their parameters at `values` under names that are not taken."""
+    for term, at in zip(terms, values, strict=True):
+        names = _Names(model)
+        renamed = {name: names.fresh(name) for name in term.names}
         text = re.sub(r"[A-Za-z_]\w*", lambda m, r=renamed: r.get(m.group(), m.group()), term.text)
-        added = {renamed[name]: Parameter(values[name], sd=sds.get(name) or None) for name in term.names}
-        model = model.plus(term.equation, text, added)
+        # Nothing is known of a new coefficient beforehand: free, so that refitting is not held by its own result.
+        model = model.plus(term.equation, text, {renamed[n]: Parameter(at[n], free=True) for n in term.names})
     return model
 
 

@@ -1,0 +1,258 @@
+"""The verdict: how sure, in numbers and in words, from everything that was refitted."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from suite.discovery import misfit, words
+from suite.discovery.engine import Point, Problem
+from suite.discovery.fit import Hypothesis, Level, covariance, fit, levenberg_marquardt, prepare, summarise
+from suite.discovery.identify import ALARM, Search, needs_more, score, search
+from suite.discovery.library import Term, candidates, grown
+from suite.discovery.result import Candidate, Coefficient, Kind, Named, Verdict
+from suite.effect import Effect
+from suite.model import Model
+from suite.record import Record
+
+Array = npt.NDArray[np.float64]
+
+SURE = 0.9  # weight from which a verdict names one effect
+PLAUSIBLE = 0.99  # weight that the stated set holds
+SEPARABLE = 16.0  # delta^2 below which data cannot tell two hypotheses apart
+SHOWN = 6  # rivals whose separation is computed
+REMAINS = 0.15  # of the error beyond the noise: what may remain for an effect to count as found, though not alone
+WHITE = 0.001  # Ljung-Box p below which a residual is not white
+
+
+def diagnose(model: Model, record: Record, effects: Mapping[str, Effect], absolute: bool = False) -> Verdict:
+    """Compare, search, judge: the verdict on one model and one record."""
+    return judge(investigate(model, record, effects, absolute))[0]
+
+
+def investigate(model: Model, record: Record, effects: Mapping[str, Effect], absolute: bool = False) -> Search:
+    """Everything that was fitted to this record."""
+    began = time.perf_counter()
+    found = search(prepare(model, record, candidates(model, effects, absolute)))
+    return replace(found, seconds=time.perf_counter() - began)
+
+
+def judge(found: Search) -> tuple[Verdict, Hypothesis]:
+    """The verdict and the hypothesis it stands on."""
+    began = time.perf_counter()
+    problem, base = found.problem, found.base
+    names = list(problem.model.outputs)
+    everything = [base, *found.fitted]
+    exact = [found.criterion(h) for h in everything]
+    best = everything[int(np.argmin(exact))]
+    settled = not needs_more(found, best)
+    if settled:
+        values = np.array(exact)
+    else:
+        # Something remains unexplained: what is left counts as process noise, alike for all, before they are compared.
+        values = np.array([found.criterion(h, h.best) for h in everything])
+        best = everything[int(np.argmin(values))]
+    weights = np.exp(-0.5 * (values - np.nanmin(values)))
+    weights = np.where(np.isfinite(weights), weights, 0.0) / np.nansum(weights)
+    ranked = sorted(zip(weights.tolist(), everything, values.tolist(), strict=True), key=lambda item: -item[0])
+    kind = _kind(found, best, settled, ranked)
+    named = best if kind in ("missing_effect", "ambiguous") else base
+    plausible = _plausible(found, ranked, named) if kind != "adequate" else []
+    count = len(problem.columns(()))
+    correlations = misfit.whiteness(problem.record, _residual(problem, base.exact), names)
+    error = _errors(found, named)
+    weight = next((w for w, h, _ in ranked if h is named), 0.0)
+    if kind == "unexplained":
+        weight = 0.0
+    verdict = Verdict(
+        kind, "", tuple(describe(problem, named)), float(weight), tuple(plausible),
+        {
+            "lambda": float(base.gain), "threshold": ALARM,
+            "ljung_box_p": misfit.ljung_box(correlations, problem.count // len(names), count),
+        },
+        _smallest(found, named), error, _parameters(problem, named), 0.0,
+    )  # fmt: skip
+    advice = _advice(found, named, ranked, verdict) if kind == "ambiguous" else ()
+    verdict = replace(verdict, advice=advice, sentence=words.sentence(verdict, problem, settled))
+    return replace(verdict, seconds=found.seconds + time.perf_counter() - began), named
+
+
+def _kind(found: Search, best: Hypothesis, settled: bool, ranked: Sequence[tuple[float, Hypothesis, float]]) -> Kind:
+    """Adequate: the base model is best and nothing remains. Unexplained: something remains that the library barely
+    touches. Ambiguous: no hypothesis has the weight, or the best leaves part of the error."""
+    base = found.base
+    if best is base:
+        return "adequate" if settled else "unexplained"
+    if not settled:
+        before, after = _excess(found.problem, base.exact), _excess(found.problem, best.exact)
+        return "ambiguous" if after < REMAINS * before else "unexplained"
+    return "missing_effect" if ranked[0][0] >= SURE else "ambiguous"
+
+
+def _excess(problem: Problem, level: Level) -> float:
+    """Error beyond the noise, as a multiple of the noise's standard deviation."""
+    if not level.passed.finite:
+        return np.inf
+    return float(np.sqrt(max(float(np.mean(level.passed.e**2)) - 1.0, 0.0)))
+
+
+def _residual(problem: Problem, level: Level) -> Array:
+    """Measured minus simulated in noise units, (N, outputs)."""
+    residual = (problem.record.y - level.passed.Y) / np.sqrt(problem.R)
+    wrapped = np.arctan2(np.sin(problem.record.y - level.passed.Y), np.cos(problem.record.y - level.passed.Y))
+    return np.where(problem.angles > 0, wrapped / np.sqrt(problem.R), residual)
+
+
+def describe(problem: Problem, hypothesis: Hypothesis) -> list[Named]:
+    """The effects of a hypothesis with their fitted coefficients and standard deviations."""
+    exact = hypothesis.exact
+    if not hypothesis.active or not exact.passed.finite:
+        return []
+    V = covariance(problem, exact, hypothesis.columns)
+    edge = V.shape[0] - len(hypothesis.columns)
+    place = {int(j): edge + i for i, j in enumerate(hypothesis.columns)}
+    named = []
+    for k in hypothesis.active:
+        term = problem.terms[k]
+        coefficients = {
+            name: Coefficient(float(exact.point.p[j]), float(np.sqrt(max(V[place[j], place[j]], 0.0))))
+            for name, j in zip(term.names, problem.places(k), strict=True)
+        }
+        named.append(Named(term.effect.id, term.equation, term.text, coefficients))
+    return named
+
+
+def _parameters(problem: Problem, hypothesis: Hypothesis) -> dict[str, dict[str, float]]:
+    fitted = summarise(problem, hypothesis)
+    return {
+        name: {"before": p.value, "value": fitted.parameters[name][0], "sd": fitted.parameters[name][1]}
+        for name, p in problem.model.parameters.items()
+    }
+
+
+def amended(problem: Problem, hypothesis: Hypothesis) -> Model:
+    """The model with the hypothesis' terms added, everything at its fitted value; what was known stays known."""
+    point = hypothesis.exact.point
+    fitted = summarise(problem, hypothesis).model
+    terms = tuple(problem.terms[k] for k in hypothesis.active)
+    values = [dict(zip(t.names, point.p[problem.places(k)].tolist(), strict=True))
+              for k, t in zip(hypothesis.active, terms, strict=True)]  # fmt: skip
+    return grown(fitted, terms, values)
+
+
+def _errors(found: Search, named: Hypothesis) -> dict[str, Any]:
+    """Errors of the calibrated base model and of the named one, the noise, and free-run errors on held-out data."""
+    problem = found.problem
+    names = list(problem.model.outputs)
+    before = misfit.rmse(problem.record, found.base.exact.passed.Y, names)
+    after = misfit.rmse(problem.record, named.exact.passed.Y, names)
+    noise = dict(zip(names, np.sqrt(problem.R).tolist(), strict=True))
+    error: dict[str, Any] = {"before": before, "after": after, "noise": noise}
+    parts = misfit.split(problem.record)
+    if parts is None:
+        return error
+    train, judged, lead = parts
+    held: dict[str, dict[str, float]] = {}
+    for label, hypothesis in (("before", found.base), ("after", named)):
+        # The same structure, fitted again to the training part alone, from the file's values.
+        model = amended(problem, hypothesis) if hypothesis.active else problem.model
+        fitted = fit(model, train)
+        held[label] = misfit.held_out_error(fitted.model, judged, lead)
+    return {**error, "held_out": held}
+
+
+def _plausible(found: Search, ranked: Sequence[tuple[float, Hypothesis, float]], best: Hypothesis) -> list[Candidate]:
+    """The hypotheses that hold 99 % of the weight, and any other that the data cannot tell from the best."""
+    problem = found.problem
+    names = list(problem.model.outputs)
+    chosen, held = [], 0.0
+    for place, (weight, hypothesis, value) in enumerate(ranked):
+        if not hypothesis.active or not hypothesis.exact.passed.finite:
+            held += weight
+            continue
+        separation = None
+        if hypothesis is not best and place <= SHOWN and best.active:
+            separation = distance(problem, best, hypothesis)
+        near = separation is not None and separation < SEPARABLE
+        if held < PLAUSIBLE or near:
+            chosen.append(
+                Candidate(
+                    tuple(describe(problem, hypothesis)), weight, value,
+                    misfit.rmse(problem.record, hypothesis.exact.passed.Y, names), separation,
+                )  # fmt: skip
+            )
+        held += weight
+    return chosen
+
+
+def distance(problem: Problem, winner: Hypothesis, rival: Hypothesis, known: Sequence[str] = ()) -> float:
+    """delta^2: the squared distance, in noise units, from the winner's noise-free output to what the rival can give.
+
+    `known` parameters stay at the winner's value: how much telling apart would gain from knowing them.
+    """
+    model = problem.model
+    count = len(model.parameters)
+    fixed = {name: replace(p, fixed=p.fixed or name in known) for name, p in model.parameters.items()}
+    Y = np.where(problem.seen, winner.exact.passed.Y, np.nan)
+    p = rival.exact.point.p.copy()
+    for j, name in enumerate(model.parameters):
+        if name in known:
+            p[j] = winner.exact.point.p[j]
+    start = Point(problem.start.x0, np.concatenate([winner.exact.point.p[:count], problem.start.p[count:]]))
+    scale = max(float(np.mean(winner.exact.passed.e**2)), 1e-12)
+    clean = replace(
+        problem, model=replace(model, parameters=fixed), record=replace(problem.record, y=Y), start=start, scale=scale
+    )
+    clean.__dict__["program"] = problem.program  # the same equations: nothing to compile again
+    level = levenberg_marquardt(clean, Point(rival.exact.point.x0, p), 0.0, rival.active, 25, 1e-3)
+    return float((level.passed.e**2).sum() / scale) if level.passed.finite else np.inf
+
+
+def _advice(
+    found: Search, best: Hypothesis, ranked: Sequence[tuple[float, Hypothesis, float]], verdict: Verdict
+) -> tuple[str, ...]:
+    """What would tell the best from its nearest rival: more data, or a parameter known better."""
+    problem = found.problem
+    rivals = [h for w, h, _ in ranked if h is not best and h.active and h.exact.passed.finite and w > 0.01]
+    if not rivals:
+        return ()
+    now = {id(h): distance(problem, best, h) for h in rivals[:SHOWN]}
+    rival = min(rivals[:SHOWN], key=lambda h: now[id(h)])
+    names = [[problem.terms[k].effect.id for k in h.active] for h in (best, rival)]
+    apart = now[id(rival)]
+    said = []
+    if apart < SEPARABLE:
+        times = f"about {SEPARABLE / apart:.2g} times the data" if apart > 0.1 else "no amount of the same data"
+        said.append(words.separate(names[0], names[1], apart, times))
+    gains = []
+    for name, parameter in problem.model.parameters.items():
+        if parameter.prior_sd > 0:
+            gains.append((distance(problem, best, rival, [name]), name))
+    if gains and max(gains)[0] > max(2.0 * apart, SEPARABLE / 2):
+        said.append(
+            f"Knowing {max(gains)[1]} exactly would raise the separation from {apart:.2g} to {max(gains)[0]:.2g} "
+            f"({SEPARABLE:g} is enough to tell)."
+        )
+    if best.gain > ALARM:
+        said.append("Part of the error stays: a second effect, or one that is not in the library, acts beside it.")
+    return tuple(said)
+
+
+def _smallest(found: Search, named: Hypothesis) -> dict[str, float]:
+    """The smallest coefficient of each candidate that these data would show in 95 of 100 records."""
+    problem = found.problem
+    if not named.exact.passed.finite:
+        return {}
+    library = max(len(problem.terms) - len(found.absorbed), 2)
+    smallest = {}
+    for entry in score(problem, named, skip=found.absorbed, exact=True):
+        term: Term = problem.terms[entry.k]
+        penalty = len(term.names) * np.log(problem.count) + 2.0 * np.log(library)
+        if entry.length > 0:
+            smallest[f"{term.effect.id}@{term.equation}"] = float((np.sqrt(penalty) + 1.645) / entry.length)
+    return smallest

@@ -1,0 +1,87 @@
+"""The verdict in words an engineer would use; the numbers come from elsewhere."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from suite.discovery.engine import Problem
+from suite.discovery.result import Named, Verdict
+
+
+def sentence(verdict: Verdict, problem: Problem, settled: bool) -> str:
+    """One to three sentences: what is missing, what it removes, what cannot be told."""
+    falls = _falls(verdict)
+    match verdict.verdict:
+        case "adequate":
+            moved = _moved(verdict)
+            return f"The model is adequate: the residual is white at the noise level{moved}, no effect is missing."
+        case "unexplained":
+            return (
+                "The model fails, and nothing in the library explains it: "
+                f"the error stays at {_numbers(verdict.error['before'])} against a noise of {_numbers(verdict.error['noise'])}."
+            )
+        case "missing_effect":
+            return f"Missing: {' and '.join(map(effect, verdict.effects))}, weight {verdict.weight:.2f}; {falls}."
+    rivals = [" with ".join(named.effect for named in c.effects) + f" ({c.weight:.2f})" for c in verdict.plausible]
+    family = _family(verdict, problem)
+    common = f" In each of them {family}." if family else ""
+    rest = "" if settled else " Part of the error stays unexplained."
+    return (
+        f"An effect is missing and several fit: {', '.join(rivals)}.{common} "
+        f"With the first, {' and '.join(map(effect, verdict.effects))}, {falls}.{rest}"
+    )
+
+
+def effect(named: Named) -> str:
+    """'cubic_stiffness in x1 (-a*x2**3, a = 0.0195 +- 0.0004)'."""
+    numbers = ", ".join(f"{name} = {value_sd(c.value, c.sd)}" for name, c in named.coefficients.items())
+    return f"{named.effect} in {named.equation} ({named.term}, {numbers})"
+
+
+def value_sd(value: float, sd: float) -> str:
+    """A number with its standard deviation, the deviation to two digits and the value to the same place."""
+    if not np.isfinite(sd) or sd <= 0:
+        return f"{value:.4g}"
+    if sd > 100 * abs(value):
+        return f"{value:.2g} +- {sd:.1g}"
+    digits = int(np.clip(np.ceil(np.log10(abs(value) / sd)) + 2, 2, 8)) if value else 2
+    return f"{value:.{digits}g} +- {sd:.2g}"
+
+
+def separate(best: Sequence[str], rival: Sequence[str], apart: float, times: str) -> str:
+    """What it would take to tell two hypotheses apart."""
+    return (
+        f"These data hardly tell {' with '.join(best)} from {' with '.join(rival)} (delta^2 = {apart:.2g}, 16 is enough); "
+        f"{times} would, or a larger amplitude."
+    )
+
+
+def _falls(verdict: Verdict) -> str:
+    after, before, noise = verdict.error["after"], verdict.error["before"], verdict.error["noise"]
+    parts = [f"{name} falls from {before[name]:.3g} to {after[name]:.3g} (noise {noise[name]:.2g})" for name in after]
+    return "the error of " + ", of ".join(parts)
+
+
+def _numbers(values: dict[str, float]) -> str:
+    return ", ".join(f"{value:.3g} ({name})" for name, value in values.items())
+
+
+def _moved(verdict: Verdict) -> str:
+    """Parameters that the data put elsewhere than the file, by more than two of their deviations and 1 %."""
+    moved = [
+        f"{name} {entry['before']:.4g} -> {entry['value']:.4g}"
+        for name, entry in verdict.parameters.items()
+        if abs(entry["value"] - entry["before"]) > max(2.0 * entry["sd"], 0.01 * abs(entry["before"]))
+    ]
+    return f" after refitting ({', '.join(moved)})" if moved else ""
+
+
+def _family(verdict: Verdict, problem: Problem) -> str:
+    """What all plausible effects share, if they do."""
+    families = {term.effect.id: term.effect.family for term in problem.terms}
+    shared = [{families[named.effect] for named in candidate.effects} for candidate in verdict.plausible]
+    common = set.intersection(*shared) if shared else set()
+    return next((re.sub(r"\s+", " ", text) for text in sorted(common) if text), "")
