@@ -1,0 +1,140 @@
+"""Fixed-interval smoother on a stored filter pass, by the adjoint: no covariance is inverted.
+
+The modified Bryson-Frazier recursion (Bierman 1973) runs lambda and its information Lambda backwards,
+    over a channel:  lambda <- (I - K H)' lambda + H' nu / s,   Lambda <- (I - K H)' Lambda (I - K H) + H' H / s
+    over a step:     lambda <- Phi' lambda,                     Lambda <- Phi' Lambda Phi
+and x_s = x + P lambda, P_s = P - P Lambda P. It equals the Rauch-Tung-Striebel smoother and also holds where P is
+singular (known initial states, equations without noise). lambda is half the costate of the minimum-model-error
+problem (MATH 2 of the docs; Mook and Junkins 1988), so that d = (alpha Q)^-1 lambda.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from suite.kernels import types as nb
+from suite.kernels.cache import compile_kernel
+from suite.kernels.kalman import Filtered
+
+Array = npt.NDArray[np.float64]
+
+# v (n,); A, B (n, n)
+SMOOTHER_WORK = nb.types.Tuple((nb.VECTOR, nb.VECTOR, nb.MATRIX, nb.MATRIX))
+
+
+@compile_kernel(
+    nb.types.void(
+        nb.CUBE, nb.CUBE, nb.CUBE, nb.MATRIX, nb.MATRIX, nb.MATRIX, nb.CUBE,
+        SMOOTHER_WORK, nb.MATRIX, nb.CUBE, nb.MATRIX, nb.CUBE, nb.MATRIX, nb.CUBE,
+    )
+)  # fmt: skip
+def adjoint(
+    Phi: Any, H: Any, K: Any, nu: Any, s: Any, X: Any, P: Any,
+    work: Any, Xs: Any, Ps: Any, before: Any, Before: Any, after: Any, After: Any,
+) -> None:  # fmt: skip
+    """Run backwards over one run.
+
+    Phi, P (N, n, n), H, K (N, outputs, n), nu, s (N, outputs; s = 1, nu = K = 0 where missing), X (N, n) filtered.
+    Writes Xs, Ps smoothed, before/Before lambda and Lambda ahead of each sample's measurement, after/After behind
+    it, and work.
+    """
+    v, l0, A, B = work
+    N, n = X.shape
+    for k in range(N - 1, -1, -1):
+        for i in range(n):
+            total = 0.0
+            if k < N - 1:
+                for j in range(n):
+                    total += Phi[k + 1, j, i] * before[k + 1, j]
+            after[k, i] = total
+            v[i] = total
+            for j in range(n):
+                part = 0.0
+                if k < N - 1:
+                    for l in range(n):
+                        part += Before[k + 1, i, l] * Phi[k + 1, l, j]
+                A[i, j] = part
+        for i in range(n):
+            for j in range(n):
+                part = 0.0
+                if k < N - 1:
+                    for l in range(n):
+                        part += Phi[k + 1, l, i] * A[l, j]
+                After[k, i, j] = part
+        for i in range(n):
+            total = X[k, i]
+            for j in range(n):
+                total += P[k, i, j] * v[j]
+                part = 0.0
+                for l in range(n):
+                    part += After[k, i, l] * P[k, l, j]
+                A[i, j] = part
+            Xs[k, i] = total
+        for i in range(n):
+            for j in range(n):
+                part = P[k, i, j]
+                for l in range(n):
+                    part -= P[k, i, l] * A[l, j]
+                Ps[k, i, j] = part
+        for i in range(n):
+            for j in range(n):
+                B[i, j] = After[k, i, j]
+        for c in range(H.shape[1] - 1, -1, -1):
+            used = False
+            for i in range(n):
+                used = used or K[k, c, i] != 0.0
+            if not used and nu[k, c] == 0.0:
+                continue
+            # lambda - H' (K' lambda - nu / s)
+            total = -nu[k, c] / s[k, c]
+            for i in range(n):
+                total += K[k, c, i] * v[i]
+            for i in range(n):
+                v[i] -= H[k, c, i] * total
+            # (I - K H)' B (I - K H) = B - H' (K' B) - (B K) H + H' (K' B K) H
+            inner = 1.0 / s[k, c]
+            for i in range(n):
+                l0[i] = 0.0
+                for j in range(n):
+                    l0[i] += B[i, j] * K[k, c, j]
+                inner += K[k, c, i] * l0[i]
+            for i in range(n):
+                for j in range(n):
+                    B[i, j] += H[k, c, i] * H[k, c, j] * inner - H[k, c, i] * l0[j] - l0[i] * H[k, c, j]
+        for i in range(n):
+            before[k, i] = v[i]
+            for j in range(n):
+                Before[k, i, j] = 0.5 * (B[i, j] + B[j, i])
+
+
+@dataclass(frozen=True)
+class Smoothed:
+    """A smoothed run: x (N, n), P (N, n, n); w (N, n) the process noise of the step that ends at a sample, P_w its
+    covariance (zero at the first sample); before, after (N, n) the adjoint ahead of and behind each measurement, with
+    Before (N, n, n) the information ahead of it."""
+
+    x: Array
+    P: Array
+    w: Array
+    P_w: Array
+    before: Array
+    Before: Array
+    after: Array
+
+
+def smoothed(run: Filtered) -> Smoothed:
+    """The fixed-interval smoother of a filter pass that did not fail."""
+    N, n = run.x.shape
+    Xs, before, after = (np.zeros((N, n)) for _ in range(3))
+    Ps, Before, After = (np.zeros((N, n, n)) for _ in range(3))
+    work = (np.zeros(n), np.zeros(n), np.zeros((n, n)), np.zeros((n, n)))
+    adjoint(
+        run.Phi, run.H, run.K, run.innovation, run.variance, run.x, run.P, work, Xs, Ps, before, Before, after, After
+    )  # fmt: skip
+    w = np.einsum("kij,kj->ki", run.Qd, before)
+    P_w = run.Qd - run.Qd @ Before @ run.Qd
+    return Smoothed(Xs, 0.5 * (Ps + Ps.transpose(0, 2, 1)), w, P_w, before, Before, after)
