@@ -1,0 +1,151 @@
+"""`unmodelled bench ...`: the verbs of the benchmark. Heavy imports wait until a verb runs."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+STORE = Path("unmodelled-bench.sqlite")
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add `bench` with its verbs to the command line."""
+    parser = subparsers.add_parser("bench", help="run and show the matrix of estimators and cases")
+    verbs = parser.add_subparsers(dest="bench", required=True, metavar="VERB")
+    store = argparse.ArgumentParser(add_help=False)
+    store.add_argument("--store", type=Path, default=STORE, metavar="FILE", help=f"results, default ./{STORE}")
+    as_json = argparse.ArgumentParser(add_help=False)
+    as_json.add_argument("--json", action="store_true", help="JSON alone on standard output")
+    plan = argparse.ArgumentParser(add_help=False)
+    plan.add_argument("--plan", default="spine", metavar="NAME|FILE", help="a plan of the package or a TOML file")
+    plan.add_argument("--only", metavar="PATTERN", help="cells whose line in `bench list` holds this")
+    plan.add_argument("--seeds", type=_count, metavar="N", help="seeds instead of the plan's")
+    plan.add_argument("--data", type=Path, metavar="DIR", help="folder of measured data that are not shipped")
+    work = argparse.ArgumentParser(add_help=False)
+    work.add_argument("--jobs", type=_count, metavar="N", help="processes, default one a core")
+    work.add_argument("--force", action="store_true", help="run again what is stored and unchanged")
+    out = argparse.ArgumentParser(add_help=False)
+    out.add_argument("-o", "--output", type=Path, metavar="DIR", required=True, help="folder to write to")
+
+    verbs.add_parser("list", parents=[plan, as_json], help="the plans, and the cells of one")
+    verbs.add_parser("run", parents=[plan, work, store, as_json], help="run the cells that are new or changed")
+    verbs.add_parser("tune", parents=[plan, work, store, as_json], help="only tune, with the same budget for all")
+    table = verbs.add_parser("table", parents=[store, as_json], help="the results")
+    table.add_argument("--rows", action="store_true", help="every cell instead of medians over seeds")
+    table.add_argument("--only", metavar="TEXT", help="lines with this in case, estimator or variant")
+    table.add_argument("-o", "--output", type=Path, metavar="FILE", help="write .csv, .parquet or .json")
+    verbs.add_parser("plot", parents=[store, out, as_json], help="figures from the stored results, nothing is run")
+    claims = verbs.add_parser("claims", parents=[as_json], help="published numbers beside ours")
+    claims.add_argument("--brief", action="store_true", help="the ledger alone, without what the source leaves open")
+    one = verbs.add_parser("table1", parents=[out, as_json], help="the sources' Table 1 and what better methods reach")
+    one.add_argument("--seeds", type=_count, default=5, metavar="N", help="seeds of the comparison, default 5")
+
+
+def _count(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{text}: expected a number above zero")
+    return value
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run a verb; 0 done, 2 by InputError."""
+    verb = {"list": _list, "run": _run, "tune": _run, "table": _table, "plot": _plot, "claims": _claims}
+    return verb.get(args.bench, _table_one)(args)
+
+
+def _list(args: argparse.Namespace) -> int:
+    from suite.benchmark import matrix, plan, table
+
+    cells = matrix.chosen(plan.load(args.plan), args.only, args.seeds, args.data)
+    if args.json:
+        plans = {name: plan.load(name).sentence for name in plan.shipped()}
+        print(table.to_json({"plans": plans, "plan": args.plan, "cells": [cell.label for cell in cells]}))
+        return 0
+    for name in plan.shipped():
+        print(f"{name:10s} {plan.load(name).sentence}")
+    print(f"\n{args.plan}: {len(cells)} cells")
+    print("\n".join(cell.label for cell in cells))
+    return 0
+
+
+def _run(args: argparse.Namespace) -> int:
+    from suite.benchmark import matrix, plan, table
+    from suite.benchmark.store import Store
+
+    chosen = plan.load(args.plan)
+    cells = matrix.chosen(chosen, args.only, args.seeds, args.data)
+    with Store(args.store) as store:
+        done = matrix.run(
+            cells,
+            store,
+            jobs=args.jobs,
+            limit=chosen.limit,
+            data=args.data,
+            force=args.force,
+            tune_only=args.bench == "tune",
+        )
+    if args.json:
+        print(table.to_json(done))
+    elif args.bench == "tune":
+        print(f"{done['tuned']} tunings are in {args.store}")
+    else:
+        counts = ", ".join(f"{count} {status}" for status, count in sorted(done["status"].items())) or "none"
+        print(f"{done['cells']} cells: {done['unchanged']} unchanged, {done['run']} run ({counts}); in {args.store}")
+    return 0
+
+
+def _table(args: argparse.Namespace) -> int:
+    from suite.benchmark import table
+    from suite.benchmark.store import Store
+
+    with Store(args.store, must_exist=True) as store:
+        rows = store.rows()
+    if args.only:
+        rows = [row for row in rows if args.only in f"{row['case']} {row['estimator']} {row['variant']}"]
+    shown = rows if args.rows else table.lines(rows)
+    if args.output:
+        table.write(shown, args.output)
+        print(f"{len(shown)} lines in {args.output}", file=sys.stderr)
+    if args.json:
+        print(table.to_json(shown))
+    elif not args.output:
+        print(table.text(table.lines(rows)) if not args.rows else table.to_json(rows))
+    return 0
+
+
+def _plot(args: argparse.Namespace) -> int:
+    from suite.benchmark import table
+    from suite.benchmark.store import Store
+    from suite.report import bench_figures
+
+    with Store(args.store, must_exist=True) as store:
+        rows = store.rows()
+    paths = [str(path) for path in bench_figures.draw(rows, args.output)]
+    print(table.to_json(paths) if args.json else "\n".join(paths))
+    return 0
+
+
+def _claims(args: argparse.Namespace) -> int:
+    from suite.benchmark import claims, table
+
+    ledger = claims.ledger()
+    if args.json:
+        print(table.to_json(ledger))
+        return 0
+    print(claims.text(ledger))
+    if not args.brief:
+        from suite.benchmark import table_one
+
+        print("\n" + table_one.open_text())
+    return 0
+
+
+def _table_one(args: argparse.Namespace) -> int:
+    from suite.benchmark import table, table_one_report
+
+    made = table_one_report.write(args.output, args.seeds)
+    print(table.to_json(made) if args.json else made["text"])
+    return 0

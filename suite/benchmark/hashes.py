@@ -1,0 +1,87 @@
+"""What a stored row depends on: the plug-in's source, the case as numbers, the version. Changed: run it again."""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import json
+import sys
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+import suite
+from suite import plugins
+from suite.benchmark.cells import Cell
+from suite.case import Case
+from suite.errors import DataError
+from suite.estimator import Estimator
+
+# Plug-ins share code through these packages; what they take from elsewhere is pinned by the version.
+OURS = ("estimators", "baselines", "suite.kernels")
+
+
+def _digest(*parts: Any) -> str:
+    return hashlib.sha256(json.dumps(parts, default=str).encode()).hexdigest()[:16]
+
+
+def plugin(estimator: Estimator) -> str:
+    """A hash of the source of an estimator's module and of what it takes from plug-in folders and kernels."""
+    todo, seen = [type(estimator).__module__], set()
+    texts = []
+    while todo:
+        name = todo.pop()
+        module = sys.modules.get(name)
+        if name in seen or module is None:
+            continue
+        seen.add(name)
+        try:
+            texts.append((name, inspect.getsource(module)))
+        except (OSError, TypeError):
+            texts.append((name, "no source"))
+        for value in list(vars(module).values()):
+            used = value.__name__ if isinstance(value, ModuleType) else getattr(value, "__module__", None)
+            if isinstance(used, str) and used.startswith(OURS):
+                todo.append(used)
+    return _digest(*sorted(texts))
+
+
+def case(entry: Case, data: Path | None) -> str:
+    """A hash of the models and the experiment, or of the measured record; inputs count by their values."""
+    models = [repr(entry.deficient), repr(entry.truth), entry.held, repr(entry.missing)]
+    if entry.measured is not None:
+        try:
+            record = entry.measured(data)
+        except DataError:
+            return _digest(*models, "absent")
+        return _digest(*models, _array(record.t), _array(record.u), _array(record.y), record.starts)
+    e = entry.experiment
+    assert e is not None
+    times = np.arange(0.0, e.duration, e.dt)
+    inputs = {name: _array(np.array([f(float(t)) for t in times])) for name, f in e.inputs.items()}
+    return _digest(*models, e.duration, e.dt, e.x0, inputs)
+
+
+def _array(values: Any) -> str:
+    return hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest()
+
+
+class Keys:
+    """The key of every cell and every tuning, each hash computed once."""
+
+    def __init__(self, data: Path | None) -> None:
+        self.plugin = cache(lambda name: plugin(plugins.estimators()[name]))
+        self.case = cache(lambda name: case(plugins.cases()[name], data))
+
+    def tuning(self, name: str, noise: float, estimator: str) -> str:
+        """The key of the tuned values of an estimator on a case at a noise level."""
+        return _digest("tuning", name, noise, estimator, self.plugin(estimator), self.case(name), suite.__version__)
+
+    def cell(self, cell: Cell) -> str:
+        """The key of a cell."""
+        tuned = self.tuning(cell.case, cell.noise, cell.estimator) if cell.variant == "tuned" else ""
+        versions = (self.plugin(cell.estimator), self.case(cell.case), suite.__version__)
+        return _digest(cell.label, tuned, *versions)

@@ -1,0 +1,147 @@
+"""The judge: what an estimate is worth against the truth that the estimator never saw. No sample is left out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from suite.case import Case, Truth
+from suite.estimator import Estimate
+from suite.model import Model
+from suite.record import Record
+
+Array = npt.NDArray[np.float64]
+
+# The simple shapes an effect may have in one state; the best correlated with d gives the effect its name.
+SHAPES: dict[str, Callable[[Array], Array]] = {
+    "{}": lambda s: s,
+    "{0}*|{0}|": lambda s: s * np.abs(s),
+    "{}^3": lambda s: s**3,
+    "sign({})": np.sign,
+}
+
+
+def judge(
+    case: Case, record: Record, truth: Truth | None, estimate: Estimate, kind: Literal["filter", "smoother"]
+) -> dict[str, Any]:
+    """The numbers of a row; those that do not apply are left out."""
+    row: dict[str, Any] = {}
+    if estimate.status != "ok":
+        row |= {"status": "diverged", "reason": f"{estimate.status}: {estimate.note}".rstrip(": ")}
+    if not np.all(np.isfinite(estimate.x)):
+        first = int(np.argmax(~np.isfinite(estimate.x).all(axis=1)))
+        said = row.get("reason") or f"the state is not finite from t = {record.t[first]:g} on"
+        return {**row, "status": "diverged", "reason": said, "report": dict(estimate.report or {})}
+    model = case.deficient
+    row |= {"output_rmse": _output_rmse(model, record, estimate), "report": dict(estimate.report or {})}
+    if estimate.J is not None:
+        row |= {"J": sum(estimate.J), "J_data": estimate.J[0], "J_model": estimate.J[1]}
+    if kind == "filter" and estimate.P is not None:
+        row["nis"] = nis(model, record, estimate)
+    if truth is None:
+        return row
+    error = np.sqrt(np.mean((estimate.x - truth.x) ** 2, axis=0))
+    scale = np.maximum(truth.x.std(axis=0), 1e-300)
+    row["state_rmse"] = dict(zip(model.states, error.tolist(), strict=True))
+    row["state_nrmse"] = float(np.sqrt(np.mean((error / scale) ** 2)))
+    if estimate.P is not None:
+        row["nees"] = nees(estimate.x - truth.x, estimate.P)
+    if estimate.d is None or not np.all(np.isfinite(estimate.d)):
+        return row
+    inside = [i for i, name in enumerate(model.states) if name in model.suspects]
+    gap = np.sqrt(np.mean((estimate.d - truth.d)[:, inside] ** 2))
+    size = np.sqrt(np.mean(truth.d[:, inside] ** 2))
+    row["d_rmse"] = float(gap)
+    if size > 0.0:
+        row["d_nrmse"] = float(gap / size)
+    return {**row, **coefficients(case, record, estimate), **named(case, truth, estimate)}
+
+
+def coefficients(case: Case, record: Record, estimate: Estimate) -> dict[str, Any]:
+    """The missing coefficients by least squares of d on their terms at the estimated states, as the sources do it.
+
+    The terms are the derivatives of the true rates by the coefficients; `parameter_error` is relative.
+    """
+    if not case.missing or case.truth is None or estimate.d is None:
+        return {}
+    columns = list(case.truth.parameters)
+    values = case.truth.values
+    found: dict[str, float] = {}
+    errors: dict[str, float] = {}
+    for equation in dict.fromkeys(missing.equation for missing in case.missing):
+        i = list(case.deficient.states).index(equation)
+        truths = {n: v for m in case.missing if m.equation == equation for n, v in m.coefficients.items()}
+        wanted = [columns.index(name) for name in truths]
+        x, u, t, program = estimate.x, record.u, record.t, case.truth.program
+        terms = np.array([program.rates(t[k], x[k], u[k], values)[2][i, wanted] for k in range(len(t))])
+        fitted = np.linalg.lstsq(terms, estimate.d[:, i], rcond=None)[0]
+        found |= dict(zip(truths, fitted.tolist(), strict=True))
+        errors |= {name: abs(found[name] - true) / abs(true) for name, true in truths.items()}
+    return {"parameters": found, "parameter_error": errors, "parameter_worst": max(errors.values())}
+
+
+def named(case: Case, truth: Truth, estimate: Estimate) -> dict[str, Any]:
+    """Which shape of SHAPES in which state goes best with d (largest |cosine|), and whether it is the true one.
+
+    Judged where one term is missing and one of the shapes is that term (|cosine| > 0.999 at the true states).
+    """
+    if len(case.missing) != 1 or estimate.d is None:
+        return {}
+    i = list(case.deficient.states).index(case.missing[0].equation)
+    true = _cosines(case.deficient, truth.x, truth.d[:, i])
+    right = max(true, key=lambda name: true[name])
+    if true[right] < 0.999:
+        return {}
+    said = _cosines(case.deficient, estimate.x, estimate.d[:, i])
+    best = max(said, key=lambda name: said[name])
+    return {"named_as": best, "named": int(best == right)}
+
+
+def _cosines(model: Model, x: Array, d: Array) -> dict[str, float]:
+    shapes = {text.format(s): f(x[:, j]) for j, s in enumerate(model.states) for text, f in SHAPES.items()}
+    size = np.linalg.norm(d)
+    return {name: float(abs(v @ d) / max(np.linalg.norm(v) * size, 1e-300)) for name, v in shapes.items()}
+
+
+def nees(error: Array, P: Array) -> float:
+    """Mean over time of e' P^-1 e / n: 1 where the covariance is right, above where it is too small (Bar-Shalom).
+
+    Directions in which P says "known exactly" are left out of the inverse.
+    """
+    total = [e @ np.linalg.pinv(S, hermitian=True) @ e for e, S in zip(error, P, strict=True)]
+    return float(np.mean(total) / error.shape[1])
+
+
+def nis(model: Model, record: Record, estimate: Estimate) -> float | None:
+    """Mean over time of the normalised innovation squared over the outputs; 1 where the filter is consistent.
+
+    From the updated state alone: with r = z - h(x+), R - H P+ H' = R S^-1 R and r = R S^-1 nu, hence
+    r' (R - H P+ H')^-1 r = nu' S^-1 nu. None where it is undefined.
+    """
+    if record.prior is None or estimate.P is None:
+        return None
+    R = record.prior.R
+    terms = []
+    # The first sample may have given the first state, so it is no innovation.
+    for k in range(1, len(record)):
+        seen = ~np.isnan(record.y[k])
+        if not seen.any():
+            continue
+        r = (record.y[k] - model.output(record.t[k], estimate.x[k], record.u[k]))[seen]
+        H = model.output_jacobian(record.t[k], estimate.x[k], record.u[k])[seen]
+        gap = np.diag(R[seen]) - H @ estimate.P[k] @ H.T
+        # Where the filter follows the measurement exactly (S >> R) the difference is lost in rounding.
+        if np.linalg.eigvalsh(gap / R[seen].max())[0] < 1e-9:
+            continue
+        terms.append(float(r @ np.linalg.solve(gap, r)) / seen.sum())
+    return float(np.mean(terms)) if len(terms) > len(record) // 2 else None
+
+
+def _output_rmse(model: Model, record: Record, estimate: Estimate) -> dict[str, float]:
+    """Root mean square of z - h(xhat) by output: how closely the estimate follows the measurements, not a score."""
+    h = np.array([model.output(record.t[k], estimate.x[k], record.u[k]) for k in range(len(record))])
+    rms = np.sqrt(np.nanmean((record.y - h) ** 2, axis=0))
+    return dict(zip(model.outputs, rms.tolist(), strict=True))
