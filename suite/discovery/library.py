@@ -182,14 +182,13 @@ def _kelvin(model: Model, equation: str, level: str | None) -> float | None:
     return 0.0 if value > 200 else 273.15
 
 
-def grown(model: Model, terms: Sequence[Term], values: Sequence[Mapping[str, float]]) -> Model:
-    """The model with the terms added, their parameters at `values` under names that are not taken."""
-    for term, at in zip(terms, values, strict=True):
+def grown(model: Model, terms: Sequence[Term], numbers: Sequence[Mapping[str, Parameter]]) -> Model:
+    """The model with the terms added, their parameters as in `numbers` under names that are not taken."""
+    for term, at in zip(terms, numbers, strict=True):
         names = _Names(model)
         renamed = {name: names.fresh(name) for name in term.names}
         text = re.sub(r"[A-Za-z_]\w*", lambda m, r=renamed: r.get(m.group(), m.group()), term.text)
-        # Nothing is known of a new coefficient beforehand: free, so that refitting is not held by its own result.
-        model = model.plus(term.equation, text, {renamed[n]: Parameter(at[n], free=True) for n in term.names})
+        model = model.plus(term.equation, text, {renamed[name]: at[name] for name in term.names})
     return model
 
 

@@ -17,7 +17,7 @@ from suite.discovery.identify import ALARM, Search, needs_more, score, search
 from suite.discovery.library import Term, candidates, grown
 from suite.discovery.result import Candidate, Coefficient, Kind, Named, Verdict
 from suite.effect import Effect
-from suite.model import Model
+from suite.model import Model, Parameter
 from suite.record import Record
 
 Array = npt.NDArray[np.float64]
@@ -135,14 +135,38 @@ def _parameters(problem: Problem, hypothesis: Hypothesis) -> dict[str, dict[str,
     }
 
 
-def amended(problem: Problem, hypothesis: Hypothesis) -> Model:
-    """The model with the hypothesis' terms added, everything at its fitted value; what was known stays known."""
+def amended(problem: Problem, hypothesis: Hypothesis, fitted: bool = True) -> Model:
+    """The model with the hypothesis' terms added at their fitted coefficients and bounds.
+
+    Its own parameters stand at their fitted values, or (not `fitted`) at the file's, where what is known of them holds.
+    """
     point = hypothesis.exact.point
-    fitted = summarise(problem, hypothesis).model
-    terms = tuple(problem.terms[k] for k in hypothesis.active)
-    values = [dict(zip(t.names, point.p[problem.places(k)].tolist(), strict=True))
-              for k, t in zip(hypothesis.active, terms, strict=True)]  # fmt: skip
-    return grown(fitted, terms, values)
+    low, high = problem.limits
+    model = summarise(problem, hypothesis).model if fitted else problem.model
+    terms = [problem.terms[k] for k in hypothesis.active]
+    numbers = [
+        {name: Parameter(float(point.p[j]), free=True, bounds=(float(low[j]), float(high[j])))
+         for name, j in zip(term.names, problem.places(k), strict=True)}
+        for k, term in zip(hypothesis.active, terms, strict=True)
+    ]  # fmt: skip
+    return grown(model, terms, numbers)
+
+
+def curve(problem: Problem, base: Hypothesis, hypothesis: Hypothesis, equation: str) -> Array:
+    """What the hypothesis adds to a rate of the calibrated base model along its own path, (N,)."""
+    i = list(problem.model.states).index(equation)
+    program, record = problem.program, problem.record
+    n, m = program.n, program.parameters
+    f, Fx, Fp = np.zeros(n), np.zeros((n, n)), np.zeros((n, m))
+    on, off = program.all_off(), program.all_off()
+    on[list(hypothesis.active)] = 1
+    added = np.zeros(len(record))
+    for k, x in enumerate(hypothesis.exact.passed.X):
+        program.rate(record.t[k], x, record.u[k], hypothesis.exact.point.p, on, f, Fx, Fp)
+        added[k] = f[i]
+        program.rate(record.t[k], x, record.u[k], base.exact.point.p, off, f, Fx, Fp)
+        added[k] -= f[i]
+    return added
 
 
 def _errors(found: Search, named: Hypothesis) -> dict[str, Any]:
@@ -160,8 +184,7 @@ def _errors(found: Search, named: Hypothesis) -> dict[str, Any]:
     held: dict[str, dict[str, float]] = {}
     for label, hypothesis in (("before", found.base), ("after", named)):
         # The same structure, fitted again to the training part alone, from the file's values.
-        model = amended(problem, hypothesis) if hypothesis.active else problem.model
-        fitted = fit(model, train)
+        fitted = fit(amended(problem, hypothesis, fitted=False), train)
         held[label] = misfit.held_out_error(fitted.model, judged, lead)
     return {**error, "held_out": held}
 
@@ -184,6 +207,7 @@ def _plausible(found: Search, ranked: Sequence[tuple[float, Hypothesis, float]],
                 Candidate(
                     tuple(describe(problem, hypothesis)), weight, value,
                     misfit.rmse(problem.record, hypothesis.exact.passed.Y, names), separation,
+                    curve(problem, found.base, hypothesis, problem.terms[hypothesis.active[0]].equation),
                 )  # fmt: skip
             )
         held += weight

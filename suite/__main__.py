@@ -1,0 +1,88 @@
+"""The command line. Heavy imports wait inside the verbs, so that --help answers at once."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+
+from suite import __version__
+from suite.benchmark import commands as benchmark
+from suite.errors import InputError
+
+DONE, FAILED, BAD_INPUT = 0, 1, 2
+
+
+def parser() -> argparse.ArgumentParser:
+    """The verbs and their arguments."""
+    top = argparse.ArgumentParser(
+        prog="unmodelled",
+        description="Find which physical effect an ODE model lacks, and judge the estimators that claim to.",
+        epilog="Exit codes: 0 done, 1 a finding of failure that was asked for, 2 bad input.",
+    )
+    top.add_argument("--version", action="version", version=f"unmodelled {__version__}")
+    verbs = top.add_subparsers(dest="verb", required=True, metavar="VERB")
+    as_json = argparse.ArgumentParser(add_help=False)
+    as_json.add_argument("--json", action="store_true", help="one JSON object alone on standard output")
+    inputs = argparse.ArgumentParser(add_help=False)
+    inputs.add_argument("model", type=Path, metavar="MODEL", help="model file (TOML)")
+    inputs.add_argument("data", type=Path, nargs="+", metavar="DATA", help="CSV, parquet or MAT; several are several runs")
+    search = argparse.ArgumentParser(add_help=False)
+    search.add_argument(
+        "--absolute", action="store_true", help="allow effects that depend on a state no equation depends on"
+    )
+
+    verb = verbs.add_parser("example", parents=[as_json], help="a ready model and data to start from")
+    verb.add_argument("name", metavar="NAME", help="paper, mug, whiffle, or a case of `unmodelled list`")
+    verb.add_argument("folder", type=Path, metavar="DIR", help="folder to write model.toml and data*.csv to")
+    verb.add_argument("--noise", type=float, default=0.05, help="simulated: sensor noise, default 0.05 of each spread")
+    verb.add_argument("--seed", type=int, default=1, help="simulated: seed of the noise, default 1")
+    verb.add_argument("--source", type=Path, metavar="DIR", help="folder of measured data that are not shipped")
+    verbs.add_parser("list", parents=[as_json], help="every plug-in by kind; those not loaded, and why")
+    verb = verbs.add_parser("check", parents=[inputs, as_json], help="what is in the data, and what would spoil an analysis")
+    verb.add_argument("--strict", action="store_true", help="exit with 1 if there is a finding")
+    verb = verbs.add_parser("compare", parents=[inputs, as_json], help="simulate: fit, error against noise, where it fails")
+    verb.add_argument("--refit", action="store_true", help="fit the parameters first")
+    verbs.add_parser("diagnose", parents=[inputs, search, as_json], help="ranked missing effects and the verdict")
+    verb = verbs.add_parser("add", parents=[as_json], help="write the model with an effect added")
+    verb.add_argument("model", type=Path, metavar="MODEL", help="model file (TOML)")
+    verb.add_argument("effect", metavar="EFFECT", help="an effect of `unmodelled list`")
+    verb.add_argument("--equation", metavar="NAME", help="the state in whose rate it acts, where there is a choice")
+    verb.add_argument("--data", type=Path, nargs="+", default=[], metavar="DATA", help="refit to these data")
+    verb.add_argument("-o", "--output", type=Path, required=True, metavar="NEW.toml", help="file to write")
+    verb = verbs.add_parser("discover", parents=[inputs, search, as_json], help="compare, diagnose, add, until it is noise")
+    verb.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="models, ledger, figures, report.html")
+    benchmark.add_parser(verbs)
+    return top
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command; returns its exit code."""
+    args = parser().parse_args(argv)
+    warnings.showwarning = _one_line
+    try:
+        if args.verb == "bench":
+            return benchmark.run(args)
+        from suite import verbs
+
+        return int(getattr(verbs, args.verb.replace("list", "list_plugins"))(args))
+    except InputError as error:
+        print(f"unmodelled: {error}", file=sys.stderr)
+        return BAD_INPUT
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        print(f"unmodelled: {where}{error.strerror or error}; check the path and the space left", file=sys.stderr)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        print("unmodelled: stopped; what was finished is kept", file=sys.stderr)
+        return 130
+
+
+def _one_line(message: Warning | str, *_: object, **__: object) -> None:
+    print(f"unmodelled: note: {message}", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,158 @@
+"""Before an analysis: what is in the record, what the record cannot determine, and what would spoil a verdict."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from suite.discovery.engine import Problem
+from suite.discovery.fit import covariance, homotopy, prepare
+from suite.discovery.noise import noise_variance
+from suite.model import Model
+from suite.record import Record
+
+Array = npt.NDArray[np.float64]
+
+OUTLIER = 6.0  # robust standard deviations of a sample's jump
+UNEVEN = 0.01  # relative variation of the steps from which sampling counts as irregular
+LATEST = 5  # samples of input delay that are tried
+
+
+@dataclass(frozen=True)
+class Checkup:
+    """What `check` found: facts as data, and findings as sentences (empty: nothing stands in the way)."""
+
+    facts: dict[str, Any]
+    findings: tuple[str, ...]
+
+
+def check(model: Model, record: Record) -> Checkup:
+    """Steps, gaps, outliers, noise, excitation, input delay, and null directions of the sensitivities."""
+    findings: list[str] = []
+    facts: dict[str, Any] = {"samples": len(record), "runs": len(record.starts)}
+    facts["steps"] = _steps(record, findings)
+    facts["outputs"] = _outputs(model, record, findings)
+    facts["inputs"] = _inputs(model, record, findings)
+    problem = prepare(model, record)
+    level = homotopy(problem, problem.start)
+    facts["undetermined"] = _undetermined(problem, level.exact if np.isfinite(level.exact.L) else level.best, findings)
+    facts["input_delay"] = _delays(problem, level.exact.point, findings) if model.inputs else {}
+    return Checkup(facts, tuple(findings))
+
+
+def _steps(record: Record, findings: list[str]) -> dict[str, float]:
+    steps = np.concatenate([run.dt for run in record.runs])
+    median = float(np.median(steps))
+    spread = float(steps.std() / median)
+    if spread > UNEVEN:
+        findings.append(f"Sampling is irregular: steps from {steps.min():.4g} to {steps.max():.4g}; that is allowed.")
+    if steps.max() > 10 * median:
+        findings.append(f"The longest gap is {steps.max():.4g}, {steps.max() / median:.0f} ordinary steps.")
+    return {"median": median, "smallest": float(steps.min()), "largest": float(steps.max())}
+
+
+def _outputs(model: Model, record: Record, findings: list[str]) -> dict[str, Any]:
+    facts = {}
+    sigma = np.sqrt(noise_variance(model, record))
+    for j, (name, output) in enumerate(model.outputs.items()):
+        y = record.y[:, j]
+        there = ~np.isnan(y)
+        span = float(np.ptp(y[there]))
+        jumps = np.abs(np.diff(y[there]) - np.median(np.diff(y[there])))
+        typical = max(1.4826 * float(np.median(jumps)), 1e-300)
+        outliers = int(_spikes(y[there], max(float(sigma[j]), 0.2 * typical)).sum())
+        levels = len(np.unique(y[there]))
+        facts[name] = {
+            "noise": float(sigma[j]), "given": output.sigma is not None, "range": span,
+            "missing": int((~there).sum()), "outliers": outliers,
+        }  # fmt: skip
+        if outliers:
+            findings.append(f"{name} has {outliers} spike(s) of more than {OUTLIER:g} noise deviations; look at them.")
+        if (~there).mean() > 0.5:
+            findings.append(f"{name} is missing in {100 * (~there).mean():.0f} % of the rows.")
+        if span > 0 and sigma[j] > 0.3 * span:
+            findings.append(f"{name} is mostly noise: {sigma[j]:.3g} against a range of {span:.3g}.")
+        if there.sum() > 50 and levels < 20:
+            findings.append(f"{name} takes only {levels} values; it may be quantised or saturated.")
+        for edge, word in ((np.nanmax(y), "highest"), (np.nanmin(y), "lowest")):
+            stuck = int((y == edge).sum())
+            if stuck > max(5, 0.02 * len(y)) and levels > 20:
+                findings.append(f"{name} stays at its {word} value {edge:.4g} in {stuck} samples; a saturated sensor?")
+    return facts
+
+
+def _spikes(y: Array, sigma: float) -> npt.NDArray[np.bool_]:
+    """Single samples that stand out from the median of their five neighbours."""
+    if len(y) < 7:
+        return np.zeros(len(y), dtype=bool)
+    padded = np.pad(y, 2, mode="reflect")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 5)
+    reach = np.sort(np.abs(windows - np.median(windows, axis=1)[:, None]), axis=1)[:, 3]
+    return np.asarray(np.abs(y - np.median(windows, axis=1)) > OUTLIER * np.maximum(sigma, reach))
+
+
+def _inputs(model: Model, record: Record, findings: list[str]) -> dict[str, Any]:
+    facts = {}
+    for j, name in enumerate(model.inputs):
+        u = record.u[:, j]
+        span = float(np.ptp(u))
+        facts[name] = {"range": span, "levels": len(np.unique(u))}
+        if span == 0.0:
+            findings.append(f"Input {name} is constant: nothing that depends on how it acts can be told from a bias.")
+    return facts
+
+
+def _undetermined(problem: Problem, level: Any, findings: list[str]) -> dict[str, Any]:
+    """Parameters and initial states that the data alone do not fix: null directions of the scaled sensitivities."""
+    columns = problem.columns(())
+    runs = len(problem.start.x0)
+    states = [name for name, free in zip(problem.model.states, problem.free_x0, strict=True) if free]
+    tag = (lambda r: f" of run {r + 1}") if runs > 1 else (lambda r: "")
+    labels = [f"first {name}{tag(r)}" for r in range(runs) for name in states]
+    labels += [problem.names[j] for j in columns]
+    if not labels:
+        return {"directions": [], "sd": {}}
+    J = level.passed.J
+    norms = np.sqrt((J**2).sum(axis=0))
+    dead = [labels[i] for i in np.flatnonzero(norms <= 1e-12 * max(float(norms.max()), 1e-300))]
+    scaled = J / np.where(norms > 0, norms, 1.0)
+    _, singular, Vt = np.linalg.svd(scaled, full_matrices=False)
+    directions = []
+    for value, direction in zip(singular, Vt, strict=True):
+        if value < 1e-6 * singular[0]:
+            members = [labels[i] for i in np.flatnonzero(np.abs(direction) > 0.2)]
+            directions.append(members)
+            if not set(members) <= set(dead):
+                findings.append(f"Only a combination of {', '.join(members)} acts on the data; fix all but one of them.")
+    for name in dead:
+        findings.append(f"{name} has no effect on what is measured; fix it or measure more.")
+    free = replace(problem, scale=problem.noise(level.passed))
+    sds = np.sqrt(np.maximum(np.diag(covariance(free, level, columns)), 0.0))[len(labels) - len(columns) :]
+    for j, sd in zip(columns, sds, strict=True):
+        value = abs(float(level.point.p[j]))
+        if value and sd > 0.5 * value and problem.names[j] not in dead:
+            findings.append(f"{problem.names[j]} is known to {100 * sd / value:.0f} % only after these data.")
+    return {"directions": directions, "sd": dict(zip([problem.names[j] for j in columns], sds.tolist(), strict=True))}
+
+
+def _delays(problem: Problem, point: Any, findings: list[str]) -> dict[str, int]:
+    """Samples by which each input fits better when it comes later; 0 where that gains nothing."""
+    found = {}
+    base = float((problem.run(point, 0.0).e ** 2).sum())
+    for j, name in enumerate(problem.model.inputs):
+        best, chosen = base, 0
+        for late in range(1, LATEST + 1):
+            u = problem.record.u.copy()
+            for first, last in zip(problem.record.bounds[:-1], problem.record.bounds[1:], strict=True):
+                u[first + late : last, j] = problem.record.u[first : last - late, j]
+            shifted = replace(problem, record=replace(problem.record, u=u)).run(point, 0.0)
+            square = float((shifted.e**2).sum()) if shifted.finite else np.inf
+            if square < 0.8 * best:
+                best, chosen = square, late
+        found[name] = chosen
+        if chosen:
+            findings.append(f"Input {name} fits better {chosen} sample(s) later; is it delayed, or its column shifted?")
+    return found

@@ -1,0 +1,268 @@
+"""What each verb of the workbench does: read, call, print or write. Progress goes to standard error."""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+import json
+import math
+import shlex
+import sys
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from suite import plugins
+from suite.discovery import checkup, misfit
+from suite.discovery.fit import fit
+from suite.discovery.library import Term, candidates, grown
+from suite.discovery.loop import discover as loop
+from suite.discovery.result import Verdict
+from suite.discovery.verdict import diagnose as verdict_on
+from suite.discovery.words import effect as effect_words
+from suite.discovery.words import value_sd
+from suite.errors import InputError
+from suite.files import write_whole
+from suite.model import Model, Parameter
+from suite.model_file import read_model, to_toml, write_model
+from suite.readers import read_record
+from suite.record import Record
+from suite.tables import write_csv
+
+ALIASES = {"paper": "paper-cubic", "mug": "cooling-mug", "whiffle": "whiffle-ball"}
+KNOWN_TO = 0.05  # of its value: how well the parameters of a simulated example are known
+
+
+def example(args: argparse.Namespace) -> int:
+    """Write a case as model.toml and data files."""
+    cases = plugins.cases()
+    name = ALIASES.get(args.name, args.name)
+    if name not in cases:
+        raise InputError(f"no example {args.name!r}; choose one of {', '.join([*ALIASES, *cases])}")
+    case = cases[name]
+    model = case.deficient
+    if case.truth is not None:
+        if not math.isfinite(args.noise) or args.noise < 0:
+            raise InputError(f"--noise: expected a fraction from 0, got {args.noise}; write --noise 0.05")
+        record = case.simulate(args.noise, args.seed)[0]
+        known = {n: replace(p, sd=KNOWN_TO * abs(p.value)) if not p.fixed else p for n, p in model.parameters.items()}
+        model = replace(model, parameters=known)
+    else:
+        assert case.measured is not None
+        record = case.measured(args.source)
+    args.folder.mkdir(parents=True, exist_ok=True)
+    written = [args.folder / "model.toml"]
+    write_model(replace(model, time=model.time or "t"), written[0])
+    for number, run in enumerate(record.runs):
+        target = args.folder / ("data.csv" if len(record.runs) == 1 else f"data{number + 1}.csv")
+        columns = {model.time or "t": run.t}
+        columns |= {entry.column: run.u[:, j] for j, entry in enumerate(model.inputs.values())}
+        columns |= {entry.column: run.y[:, j] for j, entry in enumerate(model.outputs.values())}
+        write_csv(target, columns)
+        written.append(target)
+    names = [str(path) for path in written]
+    if args.json:
+        return _json({"name": name, "sentence": case.sentence, "files": names})
+    print(case.sentence)
+    print(f"Wrote {', '.join(names)}")
+    print(f"Next: unmodelled discover {' '.join(map(shlex.quote, names))} -o {shlex.quote(str(args.folder / 'found'))}")
+    return 0
+
+
+def list_plugins(args: argparse.Namespace) -> int:
+    """Print every plug-in by kind, and those that could not be loaded."""
+    found = {kind: plugins.find(kind) for kind in plugins.KINDS}
+    if args.json:
+        return _json(
+            {kind: {"loaded": {n: _says(item) for n, item in f.loaded.items()}, "failed": f.failed} for kind, f in found.items()}
+        )
+    for kind, entry in found.items():
+        print(f"{kind} ({len(entry.loaded)})")
+        width = max(map(len, entry.loaded), default=0)
+        for name, item in entry.loaded.items():
+            print(f"  {name:<{width}}  {_says(item)}")
+        for label, reason in entry.failed.items():
+            print(f"  not loaded: {label}: {reason}")
+    return 0
+
+
+def _says(item: Any) -> str:
+    """A plug-in's own sentence."""
+    text = getattr(item, "sentence", None) or (type(item).__doc__ or "").strip()
+    return str(text).split("\n")[0]
+
+
+def check(args: argparse.Namespace) -> int:
+    """Print what is in the data and what would spoil an analysis."""
+    model, record = _read(args)
+    found = checkup.check(model, record)
+    if args.json:
+        _json({**found.facts, "findings": list(found.findings)})
+        return 1 if args.strict and found.findings else 0
+    steps = found.facts["steps"]
+    print(f"{len(record)} samples in {len(record.starts)} run(s), step {steps['median']:.4g}")
+    for name, facts in found.facts["outputs"].items():
+        origin = "from the model file" if facts["given"] else "estimated"
+        print(f"{name}: range {facts['range']:.4g}, noise {facts['noise']:.3g} ({origin}), {facts['missing']} missing")
+    for name, facts in found.facts["inputs"].items():
+        print(f"{name}: range {facts['range']:.4g}, {facts['levels']} values")
+    for sentence in found.findings or ("Nothing stands in the way of an analysis.",):
+        print(f"- {sentence}")
+    return 1 if args.strict and found.findings else 0
+
+
+def compare(args: argparse.Namespace) -> int:
+    """Print how the model's free run compares with the data."""
+    model, record = _read(args)
+    if args.refit:
+        model = fit(model, record).model
+    found = misfit.compare(model, record)
+    if args.json:
+        noise = dict(zip(model.outputs, map(float, found.sigma), strict=True))
+        worst = [{"run": run, "from": first, "to": last} for run, first, last in found.worst]
+        return _json(
+            {"fit": dict(found.fit), "error": dict(found.error), "noise": noise, "worst": worst, "sentence": found.sentence}
+        )
+    print(found.sentence)
+    return 0
+
+
+def diagnose(args: argparse.Namespace) -> int:
+    """Print the verdict."""
+    model, record = _read(args)
+    found = verdict_on(model, record, plugins.effects(), args.absolute)
+    return _json(found.to_json()) if args.json else _say(found)
+
+
+def _say(found: Verdict) -> int:
+    print(found.sentence)
+    if found.plausible:
+        print("\nPlausible:")
+    for candidate in found.plausible:
+        label = ", ".join(effect_words(named) for named in candidate.effects)
+        apart = "" if candidate.separation is None else f", delta^2 {candidate.separation:.3g}"
+        print(f"  {candidate.weight:5.2f}  {label}{apart}")
+    for sentence in found.advice:
+        print(f"- {sentence}")
+    held = found.error.get("held_out")
+    if held:
+        for name in held["before"]:
+            print(f"Held-out free-run error of {name}: {held['before'][name]:.3g} -> {held['after'][name]:.3g}")
+    for name, entry in found.parameters.items():
+        print(f"{name}: {entry['before']:.4g} -> {value_sd(entry['value'], entry['sd'])}")
+    return 0
+
+
+def add(args: argparse.Namespace) -> int:
+    """Write the amended model and print the diff."""
+    model = read_model(args.model)
+    effects = plugins.effects()
+    if args.effect not in effects:
+        close = difflib.get_close_matches(args.effect, effects, 1)
+        raise InputError(f"no effect {args.effect!r}; {f'did you mean {close[0]}? ' if close else ''}see `unmodelled list`")
+    term = _chosen(model, args.effect, args.equation)
+    record = read_record(args.data, model) if args.data else None
+    start = _numbers(model, term, record)
+    new = grown(model, [term], [start])
+    if record is not None:
+        new = fit(new, record).model
+    write_model(new, args.output)
+    before, after = to_toml(model).splitlines(), to_toml(new).splitlines()
+    diff = [line for line in difflib.unified_diff(before, after, str(args.model), str(args.output), lineterm="", n=1)]
+    if args.json:
+        values = {name: new.parameters[name].value for name in new.parameters if name not in model.parameters}
+        return _json({"file": str(args.output), "term": term.text, "equation": term.equation, "coefficients": values, "diff": diff})
+    print("\n".join(diff))
+    return 0
+
+
+def _chosen(model: Model, effect: str, equation: str | None) -> Term:
+    """The one candidate that is meant; where several are, the sentence names them."""
+    if equation is not None and equation not in model.states:
+        raise InputError(f"--equation {equation}: no such state; the model has {', '.join(model.states)}")
+    every = [t for t in candidates(model, {effect: plugins.effects()[effect]}, absolute=True)]
+    terms = [t for t in every if equation in (None, t.equation)]
+    if len(terms) == 1:
+        return terms[0]
+    if not terms:
+        where = f" in {equation}'" if equation else ""
+        raise InputError(f"{effect} has no role to play{where}: no state there is what it acts on; see docs/model-file.md")
+    equations = sorted({t.equation for t in terms})
+    if len(equations) > 1:
+        raise InputError(f"{effect} could act in {', '.join(equations)}; choose with --equation")
+    return terms[0]
+
+
+def _numbers(model: Model, term: Term, record: Record | None) -> Mapping[str, Parameter]:
+    """Start values of a new term's parameters: coefficients zero, inner scales in the middle of the visited range."""
+    from suite.discovery.fit import prepare
+
+    spread: Mapping[str, float] = {}
+    length = 1.0
+    if record is not None:
+        problem = prepare(model, record)
+        spread, length = problem.spread, problem.length
+    free = {name: Parameter(0.0, free=True) for name in term.coefficients}
+    for name, inner in term.inner.items():
+        unit = term.scale(name, spread, length)
+        free[name] = Parameter(inner.start * unit, free=True, bounds=(inner.low * unit, inner.high * unit))
+    return free
+
+
+def discover(args: argparse.Namespace) -> int:
+    """Run the loop and write models, ledger, figures and report."""
+    from suite.report.page import write_figures, write_report
+
+    model, record = _read(args)
+    effects = plugins.effects()
+    ledger = loop(model, record, effects, args.absolute, lambda text: print(text, file=sys.stderr))
+    folder: Path = args.output
+    folder.mkdir(parents=True, exist_ok=True)
+    for number, step in enumerate(ledger.steps):
+        write_model(step.model, folder / f"step{number}.toml")
+    write_model(ledger.steps[-1].model, folder / "model.toml")
+    write_whole(folder / "ledger.json", json.dumps(_finite({"sentence": ledger.sentence, "steps": list(ledger.history)}), indent=1))
+    command = f"unmodelled discover {' '.join(shlex.quote(str(p)) for p in [args.model, *args.data])} -o {shlex.quote(str(folder))}"
+    write_figures(ledger, folder / "figures")
+    write_report(ledger, folder / "report.html", command, ledger.sentence, effects)
+    first = ledger.steps[0].verdict
+    assert first is not None
+    if args.json:
+        return _json(first.to_json())
+    print(ledger.sentence)
+    _table(ledger.history)
+    print(f"Report: {folder / 'report.html'}")
+    return 0
+
+
+def _table(rows: Iterable[Mapping[str, Any]]) -> None:
+    """The ledger, a line a step."""
+    for row in rows:
+        added = ", ".join(f"{name} = {value:.4g}" for name, value in row["added"].items()) or "the model as given, refitted"
+        errors = ", ".join(f"{name} {value:.3g}" for name, value in row["error"].items())
+        held = ", ".join(f"{name} {value:.3g}" for name, value in row["held_out"].items())
+        print(f"  step {row['step']}: {added}: error {errors}" + (f" (held out {held})" if held else ""))
+
+
+def _read(args: argparse.Namespace) -> tuple[Model, Record]:
+    model = read_model(args.model)
+    if not model.outputs:
+        raise InputError(f"{args.model}: no outputs; add a table [outputs] that says what was measured")
+    return model, read_record(args.data, model)
+
+
+def _json(thing: Any) -> int:
+    print(json.dumps(_finite(thing), indent=1, ensure_ascii=False))
+    return 0
+
+
+def _finite(thing: Any) -> Any:
+    """The same with None where a number is not finite: JSON has no other word for it."""
+    if isinstance(thing, Mapping):
+        return {str(key): _finite(value) for key, value in thing.items()}
+    if isinstance(thing, (list, tuple)):
+        return [_finite(value) for value in thing]
+    if isinstance(thing, float) and not math.isfinite(thing):
+        return None
+    return thing
