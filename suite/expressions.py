@@ -2,22 +2,28 @@
 
 The text is parsed to a syntax tree, and only numbers, declared names, the four operations, powers and the
 functions below are translated. Size and depth are checked on the raw text first, so that a hostile string costs
-less than reading it; constant sub-expressions are folded in floating point, so that no power tower is computed.
+less than reading it; constants are folded in floating point, so that no power tower is computed, neither of numbers
+nor of the coefficients that sympy draws out of a power.
 """
 
 from __future__ import annotations
 
 import ast
 import math
-from collections.abc import Callable, Collection
+import re
+import warnings
+from collections.abc import Callable, Collection, Sequence
 
 import sympy
+from sympy.printing.str import StrPrinter
 
 from suite.errors import ModelError
 
 LONGEST = 10_000
 DEEPEST = 100
+LAYERS = 16  # functions, powers and quotients within each other; sympy's effort grows steeply with them
 LARGEST_EXPONENT = 64
+LONG = 2**53  # above it a whole number is not exact in floating point
 
 FUNCTIONS: dict[str, tuple[int, Callable[..., sympy.Expr]]] = {
     "sin": (1, sympy.sin),
@@ -40,6 +46,8 @@ FUNCTIONS: dict[str, tuple[int, Callable[..., sympy.Expr]]] = {
 }
 CONSTANTS = {"pi": sympy.pi}
 TIME = "t"
+TOKEN = re.compile(r"\*\*|[-+~*/%@,()\[\]{}]|[^-+~*/%@,()\[\]{}\s]+")
+OPENING = frozenset(["(", "[", "{", "+", "-", "~", "*", "/", "%", "@", ",", "**"])  # after these a sign is unary
 RESERVED = frozenset(FUNCTIONS) | frozenset(CONSTANTS) | {TIME}
 
 _FLOAT_OF: dict[str, Callable[..., float]] = {
@@ -66,22 +74,51 @@ def parse(text: str, names: Collection[str], where: str) -> sympy.Expr:
         raise ModelError(f"{where}: expected an equation as text, got {text!r}; put it in quotes")
     if len(text) > LONGEST:
         raise ModelError(f"{where}: the equation has {len(text)} characters, at most {LONGEST} are read; split it")
-    if _nesting(text) > DEEPEST:
-        raise ModelError(f"{where}: more than {DEEPEST} nested brackets or signs; simplify the equation")
+    if "#" in text:
+        raise ModelError(f"{where}: '#' is not allowed in an equation; put the comment outside the quotes")
+    line = " ".join(text.split()).replace("^", "**")
+    if not line:
+        raise ModelError(f"{where}: the equation is empty; write 0 for a rate of zero")
+    if _nesting(line) > DEEPEST:
+        raise ModelError(f"{where}: more than {DEEPEST} nested brackets, signs or powers; simplify the equation")
     try:
-        tree = ast.parse(text.strip().replace("^", "**"), mode="eval")
+        with warnings.catch_warnings():
+            # Python warns of odd syntax that is refused here anyway.
+            warnings.simplefilter("ignore")
+            tree = ast.parse(line, mode="eval")
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         reason = error.msg if isinstance(error, SyntaxError) else "it cannot be parsed"
-        raise ModelError(f"{where}: {_short(text)!r} is not an equation ({reason}); check brackets and operators") from None
-    return _Translator(frozenset(names), where, text).visit(tree.body, 0)
+        said = f"{_short(text)!r} is not an equation ({reason})"
+        raise ModelError(f"{where}: {said}; check brackets and operators") from None
+    return _Translator(frozenset(names), where, line).visit(tree.body)
+
+
+class _Plain(StrPrinter):  # type: ignore[misc]
+    """Text that `parse` reads back to the same numbers: all digits, our function names, two arguments at a time."""
+
+    def _print_Float(self, expr: sympy.Float) -> str:
+        return repr(float(expr))
+
+    def _print_Abs(self, expr: sympy.Expr) -> str:
+        return f"abs({self._print(expr.args[0])})"
+
+    def _print_Min(self, expr: sympy.Expr) -> str:
+        return self._pairs("min", expr.args)
+
+    def _print_Max(self, expr: sympy.Expr) -> str:
+        return self._pairs("max", expr.args)
+
+    def _pairs(self, name: str, arguments: Sequence[sympy.Expr]) -> str:
+        first, *rest = arguments
+        text = str(self._print(first))
+        for argument in rest:
+            text = f"{name}({text}, {self._print(argument)})"
+        return text
 
 
 def plain(expression: sympy.Expr) -> str:
     """The expression as text that `parse` reads back."""
-    text = str(sympy.sstr(expression))
-    for ours, theirs in (("abs(", "Abs("), ("min(", "Min("), ("max(", "Max(")):
-        text = text.replace(theirs, ours)
-    return text
+    return str(_Plain().doprint(expression))
 
 
 def latex(expression: sympy.Expr) -> str:
@@ -90,17 +127,30 @@ def latex(expression: sympy.Expr) -> str:
 
 
 def _nesting(text: str) -> int:
-    """An upper bound of the depth of the syntax tree, read off the characters."""
-    depth = deepest = run = 0
-    for character in text:
-        if character in "([{":
+    """A bound of the syntax tree's depth, read off the characters; stops above DEEPEST.
+
+    Brackets nest; without a bracket so do signs (----x) and powers (x**y**z), until a sum, product or comma.
+    """
+    chains = [0]
+    depth = deepest = 0
+    operand = False
+    for token in TOKEN.findall(text):
+        if token in "([{":
+            chains.append(0)
             depth += 1
-        elif character in ")]}":
-            depth -= 1
-        # A run of signs (--------x) or of powers nests without a bracket.
-        run = run + 1 if character in "+-*~ " else 0
-        deepest = max(deepest, depth, run)
-    return max(deepest, text.count("**") + text.count("^"))
+        elif token in ")]}":
+            depth -= chains.pop() + 1 if len(chains) > 1 else 0
+        elif token == "**" or (token in "+-~" and not operand):
+            chains[-1] += 1
+            depth += 1
+        elif token in "+-~*/%@,":
+            depth -= chains[-1]
+            chains[-1] = 0
+        operand = token not in OPENING
+        deepest = max(deepest, depth)
+        if deepest > DEEPEST:
+            break
+    return deepest
 
 
 def _short(text: str) -> str:
@@ -114,38 +164,90 @@ class _Translator:
         self.names = names
         self.where = where
         self.text = text
+        self.layers = 0
 
     def refuse(self, what: str, mend: str) -> ModelError:
         return ModelError(f"{self.where}: {what}; {mend}")
 
-    def visit(self, node: ast.expr, depth: int) -> sympy.Expr:
-        if depth > 10 * DEEPEST:
-            raise self.refuse("the equation is nested too deeply", "split it")
+    def visit(self, node: ast.expr) -> sympy.Expr:
         match node:
             case ast.Constant(value=value) if type(value) in (int, float):
                 return self.number(value)
             case ast.Name(id=name):
                 return self.name(name)
             case ast.UnaryOp(op=ast.USub() | ast.UAdd() as op, operand=operand):
-                inner = self.visit(operand, depth + 1)
+                inner = self.visit(operand)
                 return -inner if isinstance(op, ast.USub) else inner
-            case ast.BinOp(left=left, op=op, right=right):
-                return self.binary(op, self.visit(left, depth + 1), self.visit(right, depth + 1))
+            case ast.BinOp(op=ast.Add() | ast.Sub()):
+                return self.sum(node)
+            case ast.BinOp(op=ast.Mult() | ast.Div()):
+                return self.product(node)
+            case ast.BinOp(left=left, op=ast.Pow(), right=right):
+                return self.power(self.inner(left), self.inner(right))
+            case ast.BinOp():
+                raise self.refuse(f"the operator in {self.said(node)} is not allowed", "use + - * / and ** (or ^)")
             case ast.Call(func=ast.Name(id=name), args=args, keywords=[]):
-                return self.call(name, [self.visit(argument, depth + 1) for argument in args])
+                return self.call(name, args)
         raise self.refuse(
-            f"{_short(ast.unparse(node)) if depth < DEEPEST else _short(self.text)!r} is not allowed in an equation",
+            f"{self.said(node)} is not allowed in an equation",
             "use numbers, declared names, + - * / ** and the listed functions",
         )
 
+    def inner(self, node: ast.expr) -> sympy.Expr:
+        """What stands within a function, a power or below a fraction line."""
+        self.layers += 1
+        if self.layers > LAYERS:
+            raise self.refuse(f"more than {LAYERS} functions, powers or quotients within each other", "simplify it")
+        expression = self.visit(node)
+        self.layers -= 1
+        return expression
+
+    def said(self, node: ast.expr) -> str:
+        return repr(_short(ast.get_source_segment(self.text, node) or self.text))
+
+    def sum(self, node: ast.expr) -> sympy.Expr:
+        """Of a + b - c ...: in a loop, as long sums are deep trees, and in one go, as sympy sorts at every +."""
+        terms = []
+        while isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add | ast.Sub):
+            term = self.visit(node.right)
+            terms.append(-term if isinstance(node.op, ast.Sub) else term)
+            node = node.left
+        return self.bounded(sympy.Add(self.visit(node), *reversed(terms)))
+
+    def product(self, node: ast.expr) -> sympy.Expr:
+        """Of a * b / c ..., likewise."""
+        factors = []
+        while isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult | ast.Div):
+            factor = self.inner(node.right) if isinstance(node.op, ast.Div) else self.visit(node.right)
+            if isinstance(node.op, ast.Div):
+                if factor.is_zero:
+                    raise self.refuse("division by zero", "check the denominator")
+                factor = 1 / factor
+            factors.append(factor)
+            node = node.left
+        return self.bounded(sympy.Mul(self.visit(node), *reversed(factors)))
+
+    def bounded(self, expression: sympy.Expr) -> sympy.Expr:
+        """The expression with long exact numbers in floating point; what overflows is refused."""
+        if expression.is_Rational:
+            if max(abs(expression.p), expression.q) < LONG:
+                return expression
+            return self.number(self.finite(lambda: float(expression)))
+        if expression.is_number:
+            return expression if expression.has(sympy.pi) else self.number(self.finite(lambda: float(expression)))
+        head, rest = expression.as_coeff_Mul()
+        if head.is_Rational and max(abs(head.p), head.q) < LONG:
+            return expression
+        return self.number(self.finite(lambda: float(head))) * rest
+
     def number(self, value: int | float) -> sympy.Expr:
         if isinstance(value, int):
-            if abs(value) >= 2**53:
+            if abs(value) >= LONG:
                 return self.number(self.finite(lambda: float(value)))
             return sympy.Integer(value)
         if not math.isfinite(value):
             raise self.refuse("a number is too large", "write it below 1e308")
-        return sympy.Integer(int(value)) if value == int(value) and abs(value) < 2**53 else sympy.Float(value)
+        return sympy.Integer(int(value)) if value == int(value) and abs(value) < LONG else sympy.Float(value)
 
     def name(self, name: str) -> sympy.Expr:
         if name in CONSTANTS:
@@ -156,39 +258,26 @@ class _Translator:
             raise self.refuse(f"{name} is a function", f"write {name}(...)")
         raise self.refuse(f"{name!r} is not declared", "add it to [inputs] or [parameters]")
 
-    def binary(self, op: ast.operator, left: sympy.Expr, right: sympy.Expr) -> sympy.Expr:
-        match op:
-            case ast.Add():
-                return left + right
-            case ast.Sub():
-                return left - right
-            case ast.Mult():
-                return left * right
-            case ast.Div():
-                if right.is_zero:
-                    raise self.refuse("division by zero", "check the denominator")
-                return left / right
-            case ast.Pow():
-                return self.power(left, right)
-        raise self.refuse("an operator is not allowed in an equation", "use + - * / and ** (or ^)")
-
     def power(self, base: sympy.Expr, exponent: sympy.Expr) -> sympy.Expr:
         if not exponent.is_number:
-            return base**exponent
-        value = float(exponent)
-        if abs(value) > LARGEST_EXPONENT:
-            raise self.refuse(f"an exponent of {value:g} is too large", f"use at most {LARGEST_EXPONENT}")
+            return self.bounded(base**exponent)
+        value = self.finite(lambda: float(exponent))
+        # sympy merges (x**64)**64 to one power, so that towers of small exponents count as one large one.
+        inner = float(base.exp) if base.is_Pow and base.exp.is_number else 1.0
+        if max(abs(value), abs(value * inner)) > LARGEST_EXPONENT:
+            raise self.refuse(f"an exponent of {value * inner:g} is too large", f"use at most {LARGEST_EXPONENT}")
         if base.is_number:
             return self.number(self.finite(lambda: float(base) ** value))
-        return base ** (sympy.Integer(int(value)) if value == int(value) else exponent)
+        return self.bounded(base ** (sympy.Integer(int(value)) if value == int(value) else exponent))
 
-    def call(self, name: str, arguments: list[sympy.Expr]) -> sympy.Expr:
+    def call(self, name: str, nodes: Sequence[ast.expr]) -> sympy.Expr:
         if name not in FUNCTIONS:
             known = " ".join(sorted(FUNCTIONS))
             raise self.refuse(f"{name!r} is not a function of the model language", f"use one of {known}")
         count, function = FUNCTIONS[name]
-        if len(arguments) != count:
-            raise self.refuse(f"{name} takes {count} argument(s), got {len(arguments)}", "check the call")
+        if len(nodes) != count:
+            raise self.refuse(f"{name} takes {count} argument(s), got {len(nodes)}", "check the call")
+        arguments = [self.inner(node) for node in nodes]
         if all(argument.is_number for argument in arguments):
             return self.number(self.finite(lambda: _FLOAT_OF[name](*(float(a) for a in arguments))))
         return function(*arguments)

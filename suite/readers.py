@@ -74,7 +74,8 @@ def _time_column(table: Table, model: Model) -> str:
     if "t" in table.columns:
         _there(table, "t")
         return "t"
-    used = {entry.column: name for name, entry in (*model.inputs.items(), *model.outputs.items())}
+    used = {entry.column: name for name, entry in model.inputs.items()}
+    used |= {entry.column: name for name, entry in model.outputs.items()}
     first = table.columns[0] if table.columns else ""
     if not first or first in used:
         taken = f"the first column {first!r} is {used[first]}" if first else "no columns"

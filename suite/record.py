@@ -32,7 +32,8 @@ class Record:
     """Measurements on a time axis of their own: t (N,), u (N, inputs), y (N, outputs), NaN in y where missing.
 
     `starts` are the first samples of the runs, `names` their names (none, or one a run); within a run time increases.
-    There is no field for the truth, so no estimator can see it. Raises DataError where shapes disagree, time does not increase, or a run has one sample.
+    There is no field for the truth, so no estimator can see it. Raises DataError where shapes disagree, time does not
+    increase, or a run has one sample.
     """
 
     t: Array

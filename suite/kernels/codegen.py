@@ -111,19 +111,19 @@ HEADER = '''"""Generated; safe to delete."""
 import math
 
 from suite.kernels.types import MODEL_FUNCTION
-from suite.kernels.cache import compile_kernel'''
+from suite.kernels.cache import compile_kernel
+from suite.kernels.steps import sign'''
 
 
 class _Printer(PythonCodePrinter):  # type: ignore[misc]
-    """Scalar code of the math module; sign, step functions and their derivatives spelled out."""
+    """Scalar code of the math module; sign and step functions are spelled out."""
 
     def _print_Symbol(self, expr: sympy.Expr) -> str:
         # Declared names get a prefix, so that none can collide with the text around them.
         return str(expr.name) if expr.name == "t" or expr.name.startswith("_c") else f"s_{expr.name}"
 
     def _print_sign(self, expr: sympy.Expr) -> str:
-        argument = self._print(expr.args[0])
-        return f"(1.0 if {argument} > 0.0 else (-1.0 if {argument} < 0.0 else 0.0))"
+        return f"sign({self._print(expr.args[0])})"
 
     def _print_Heaviside(self, expr: sympy.Expr) -> str:
         return f"(1.0 if {self._print(expr.args[0])} > 0.0 else 0.0)"
