@@ -9,13 +9,9 @@ import numpy.typing as npt
 
 from suite.errors import DataError
 from suite.estimator import Estimate
-from suite.kernels.embedding import (
-    continuous_embedding,
-    discrete_embedding,
-    embedding_workspace,
-    rates_from_jumps,
-)
+from suite.kernels.embedding import continuous_embedding, discrete_embedding, embedding_workspace
 from suite.kernels.integrate import workspace
+from suite.kernels.jumps import rates
 from suite.kernels.kalman import angles, arrays, held
 from suite.kernels.matrix import flow_workspace
 from suite.model import Model
@@ -25,15 +21,21 @@ Array = npt.NDArray[np.float64]
 Riccati = Literal["transition", "integration"]
 Residual = Literal["before", "after"]
 
-REASONS = {1: "the state estimate left every bound", 2: "S escaped to infinity", 3: "the gain became too stiff to integrate"}
-# With less noise than this the gain settles within 1/STIFFEST of a sample, far below what interpolating z resolves.
+REASONS = {
+    1: "the state estimate left every bound",
+    2: "S escaped to infinity",
+    3: "the gain became too stiff to integrate",
+}
+# With less noise than this the gain settles within 1/STIFFEST of a sample, beyond what RK4 can follow in fair time.
 STIFFEST = 200.0
 
 
 def prior_of(record: Record) -> Prior:
     """The record's prior; raises DataError where there is none."""
     if record.prior is None:
-        raise DataError(f"{record.source}: the record has no prior; add one with record.with_prior(Prior(x0, P0, R, Q))")
+        raise DataError(
+            f"{record.source}: the record has no prior; add one with record.with_prior(Prior(x0, P0, R, Q))"
+        )
     return record.prior
 
 
@@ -49,50 +51,72 @@ def density(prior: Prior, q_scale: float, Q: Array | None) -> Array:
 
 def cost(
     model: Model, record: Record, x: Array, d: Array, inverse: Array, alpha: float, R: Array
-) -> tuple[float, float]:
+) -> tuple[float, float] | None:
     """J = (1/T) integral of e' R^-1 e + alpha d' Q d, its two parts, by the trapezoidal rule over the samples.
 
     e = z - h(xhat) (missing: 0), R (N, outputs) the spectral density, inverse (n, n) = Q^-1. The model part counts
-    the equations that have a finite weight: a definition's dhat is a correction of the state, not a model error.
+    the equations that have a finite weight: a definition's dhat is a correction of the state, not a model error. None
+    where a diverged estimate makes it overflow.
     """
     h = np.array([model.output(t, state, u) for t, state, u in zip(record.t, x, record.u, strict=True)])
-    e = record.y - h
     wraps = angles(model) > 0
-    e[:, wraps] = np.arctan2(np.sin(e[:, wraps]), np.cos(e[:, wraps]))
-    data = np.nansum(e**2 / R, axis=1)
     counted = np.flatnonzero(np.diag(inverse) > 0)
     weight = np.linalg.inv(inverse[np.ix_(counted, counted)])
-    part = alpha * np.einsum("ki,ij,kj->k", d[:, counted], weight, d[:, counted])
     length = record.t[-1] - record.t[0]
-    return float(np.trapezoid(data, record.t) / length), float(np.trapezoid(part, record.t) / length)
+    with np.errstate(all="ignore"):
+        e = record.y - h
+        e[:, wraps] = np.arctan2(np.sin(e[:, wraps]), np.cos(e[:, wraps]))
+        data = np.nansum(e**2 / R, axis=1)
+        part = alpha * np.einsum("ki,ij,kj->k", d[:, counted], weight, d[:, counted])
+        J = float(np.trapezoid(data, record.t) / length), float(np.trapezoid(part, record.t) / length)
+    return J if np.all(np.isfinite(J)) else None
+
+
+def between_samples(model: Model, record: Record, R: Array) -> Array:
+    """Variance (outputs,) of a measurement read off the line between two samples, beyond its noise R.
+
+    A sample's distance from the line through its neighbours is four times the largest error of the lines beside it,
+    whose mean square is 8/15 of its largest; noise makes 1.5 R of that distance's variance. Angles may wrap: 0.
+    """
+    t, y = record.t, record.y
+    if len(t) < 3:
+        return np.zeros_like(R)
+    share = ((t[1:-1] - t[:-2]) / (t[2:] - t[:-2]))[:, None]
+    off = y[1:-1] - (1.0 - share) * y[:-2] - share * y[2:]
+    counts = np.maximum(np.sum(~np.isnan(off), axis=0), 1)
+    excess = np.maximum(np.nansum(off**2, axis=0) / counts - 1.5 * R, 0.0) * (8.0 / 15.0) / 16.0
+    return np.where(angles(model) > 0, 0.0, excess)
 
 
 def continuous(
     model: Model, record: Record, alpha: float, q_scale: float, riccati: Riccati,
     Q: Array | None, R: Array | None, S0: Array | None,
 ) -> Estimate:  # fmt: skip
-    """The continuous filter (47)-(55) over one run; R (outputs,) spectral density, default R_sample dt."""
+    """The continuous filter (47)-(55) over one run; R (outputs,) spectral density.
+
+    By default R is R_sample dt, R_sample with the error of the line between samples (`between_samples`): without it
+    a gain that trusts z would follow the kinks of that line.
+    """
     prior, program = prior_of(record), model.program
     inverse = density(prior, q_scale, Q)
     W = inverse / (2.0 * alpha)
     steps = np.concatenate([record.dt[:1], record.dt])
     note = ""
     if R is None:
-        Rk = prior.R * steps[:, None]
         H = np.atleast_2d(model.output_jacobian(record.t[0], prior.x0, record.u[0]))
         q = np.einsum("ci,ij,cj->c", H, np.abs(2.0 * W), H)
-        least = q * steps[:, None] ** 2 / STIFFEST**2
-        if np.any(Rk < least):
-            note = f"R raised so that the gain settles in no less than 1/{STIFFEST:g} of a sample"
-            Rk = np.maximum(Rk, least)
+        sample = prior.R + between_samples(model, record, prior.R)
+        Rk = np.maximum(sample * steps[:, None], q * steps[:, None] ** 2 / STIFFEST**2)
+        if np.any(Rk > 2.0 * prior.R * steps[:, None]):
+            note = "R raised to what z is known to between its samples"
     else:
         Rk = np.tile(np.asarray(R, dtype=np.float64), (len(steps), 1))
     n, N = program.n, len(record)
     X, S, D, info = np.zeros((N, n)), np.zeros((N, n, n)), np.zeros((N, n)), np.zeros(3, dtype=np.int64)
     start = prior.P0 / 2.0 if S0 is None else S0
     continuous_embedding(
-        program.rate, program.output, *arrays(record.t, record.u), model.linear_inputs, *arrays(record.y, prior.x0, start),
-        model.values, program.all_off(), *arrays(W, Rk), angles(model), int(riccati == "integration"), 4,
+        program.rate, program.output, *arrays(record.t, record.u), model.linear_inputs,
+        *arrays(record.y, prior.x0, start), model.values, program.all_off(), *arrays(W, Rk), angles(model), int(riccati == "integration"), 4,
         embedding_workspace(n, program.inputs, program.parameters, program.outputs_count), flow_workspace(n),
         X, S, D, info,
     )  # fmt: skip
@@ -121,17 +145,6 @@ def discrete(
     return _estimate(model, record, X, S, D, info, inverse, alpha, Rk, "")
 
 
-def rates(model: Model, record: Record, X: Array, jumps: Array) -> Array:
-    """The constant rates that make the jumps (N, n) of a discrete filter with states X (N, n) within its steps."""
-    program, D = model.program, np.zeros_like(X)
-    rates_from_jumps(
-        program.rate, *arrays(record.t, record.u), model.values, program.all_off(), *arrays(X, jumps),
-        embedding_workspace(program.n, program.inputs, program.parameters, program.outputs_count),
-        flow_workspace(program.n), D,
-    )  # fmt: skip
-    return D
-
-
 def _failed(info: npt.NDArray[np.int64]) -> int | None:
     return None if info[0] < 0 else int(info[0])
 
@@ -150,6 +163,5 @@ def _estimate(
         report["failed at"] = float(record.t[failed])
         ended = f"{REASONS[int(info[1])]} at t = {record.t[failed]:.4g} s; the last estimate is held from there"
         status, note = "diverged", f"{note}; {ended}" if note else ended
-    with np.errstate(over="ignore"):
-        J = cost(model, record, X, D, inverse, alpha, R)
+    J = cost(model, record, X, D, inverse, alpha, R)
     return Estimate(x=X, P=2.0 * S, d=D, J=J, status=status, note=note, report=report or None)

@@ -21,7 +21,7 @@ class ConventionalIE(Estimator):
     """
 
     name = "conventional-ie"
-    tuning = {"q_scale": (1e-4, 1e4, "log")}  # noqa: RUF012
+    tuning = {"q_scale": (1e-4, 1e6, "log")}  # noqa: RUF012
 
     def estimate(  # type: ignore[override]
         self,
@@ -40,7 +40,7 @@ class ConventionalIEDiscrete(Estimator):
     """Conventional IE, discrete time. Raol (2016), (63)-(74) with alpha = 1; arguments as `generalized-ie-discrete`."""
 
     name = "conventional-ie-discrete"
-    tuning = {"q_scale": (1e-4, 1e4, "log")}  # noqa: RUF012
+    tuning = {"q_scale": (1e-4, 1e6, "log")}  # noqa: RUF012
 
     def estimate(  # type: ignore[override]
         self,

@@ -31,7 +31,7 @@ class MinimumModelError(Estimator):
 
     name = "minimum-model-error"
     kind = "smoother"
-    tuning = {"alpha": (1e-4, 1e4, "log")}  # noqa: RUF012
+    tuning = {"alpha": (1e-4, 1e6, "log")}  # noqa: RUF012
 
     def estimate(  # type: ignore[override]
         self, model: Model, record: Record, alpha: float = 1.0, q_scale: float = 1.0, Q: Array | None = None

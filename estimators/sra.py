@@ -56,12 +56,18 @@ def _crosses(F: Array, G: Array, C: Array, gamma: float) -> bool:
 
 
 def _settings(
-    model: Model, record: Record, gamma: float | None, gamma_ratio: float, q_scale: float, Q: Array | None, R: Array | None
+    model: Model,
+    record: Record,
+    gamma: float | None,
+    gamma_ratio: float,
+    q_scale: float,
+    Q: Array | None,
+    R: Array | None,
 ) -> tuple[float, float]:
-    """gamma and the bounded-real threshold at the first state; without a gamma, `gamma_ratio` thresholds."""
+    """Gamma and the bounded-real threshold at the first state; without a gamma, `gamma_ratio` thresholds."""
     prior = prior_of(record)
     inverse = density(prior, q_scale, Q)
-    root = np.linalg.cholesky(inverse + 1e-300 * np.eye(len(inverse)))
+    root: Array = np.linalg.cholesky(inverse + 1e-300 * np.eye(len(inverse))).astype(np.float64)
     spectral = prior.R * float(np.median(record.dt)) if R is None else np.asarray(R, dtype=np.float64)
     F = model.jacobian(record.t[0], prior.x0, record.u[0])
     H = model.output_jacobian(record.t[0], prior.x0, record.u[0])
@@ -111,9 +117,9 @@ class SemiRobustAdaptive(Estimator):
 
 
 class SemiRobustAdaptiveDiscrete(Estimator):
-    """SRA, discrete time. Raol (2016), (92)-(95), dhat from the residual before the update unless `residual` is "after".
+    """SRA, discrete time. Raol (2016), (92)-(95).
 
-    As `sra`; R (outputs,) is the variance of a sample.
+    dhat is taken from the residual before the update, unless `residual` is "after" (as (95) is printed). As `sra`; R (outputs,) is the variance of a sample.
     """
 
     name = "sra-discrete"

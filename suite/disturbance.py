@@ -10,23 +10,24 @@ from suite.record import Prior, Record
 
 Array = npt.NDArray[np.float64]
 
-# How often the disturbance is expected to change over a record, where nothing else is known.
-CHANGES = 10.0
+# Where nothing else is known: the model error has this share of the rates' variance, and changes by its own size so
+# many times over a record.
+SHARE, CHANGES = 0.1, 3.0
 
 
 def with_random_walk(model: Model, record: Record, prior: Prior, q_scale: float) -> tuple[Model, Prior]:
     """The model with a state d_<name> for each suspect, and the prior for both.
 
     The prior's density Q says how large a model error may be: v = Q / dt is its variance when it changes from sample
-    to sample. The walk starts from 0 with variance v and has density q_scale v CHANGES / T, so that it wanders by its
-    own size T / CHANGES later. The original equations keep no other noise: what they lack, the disturbance holds.
+    to sample. The walk starts from 0 with variance v and has density q_scale SHARE v CHANGES / T, T the record's
+    length. The original equations keep no other noise: what they lack, the disturbance holds.
     """
     names = list(model.states)
     at = np.array([names.index(name) for name in model.suspects], dtype=np.int64)
     n, m = len(names), len(at)
     dt = float(np.median(record.dt))
     variance = prior.Q[at] / dt
-    walk = q_scale * variance * CHANGES / float(record.t[-1] - record.t[0])
+    walk = q_scale * SHARE * variance * CHANGES / float(record.t[-1] - record.t[0])
     P0 = np.zeros((n + m, n + m))
     P0[:n, :n] = prior.P0
     P0[n:, n:] = np.diag(variance)

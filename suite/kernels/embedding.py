@@ -4,7 +4,7 @@ Both take the source W of the Riccati equation, (1/(2 alpha)) Q^-1, with its sig
 (alpha = -gamma^2) is the same code. P = 2S makes them the extended Kalman-Bucy filter and the extended Kalman filter
 with process-noise density (alpha Q)^-1.
 
-info (3,) says how a run ended: sample of the failure or -1, its reason, first sample at which S >= 0 no longer holds or -1.
+info (3,) says how a run ended: sample of the failure or -1, its reason, first sample at which S >= 0 fails or -1.
 Reasons: 1 the state is no longer finite, 2 S escapes, 3 the filter is too stiff for MOST_PARTS parts of a sample.
 """
 
@@ -22,10 +22,8 @@ from suite.kernels.integrate import WORK, advance, speed
 from suite.kernels.matrix import (
     FLOW_WORK,
     MOST_PARTS,
-    exponential,
     integrated_flow,
     semidefinite,
-    solve,
     transition_flow,
 )
 
@@ -63,7 +61,7 @@ def correction(
     output: Any, t: float, x: Any, u: Any, p: Any, on: Any, S: Any, z0: Any, z1: Any, share: float,
     R: Any, angle: Any, yv: Any, Hx: Any, Hp: Any, d: Any,
 ) -> None:  # fmt: skip
-    """d = 2 S H' R^-1 (z - h(x)), z on the line from z0 to z1 at `share`. Writes d and yv, Hx, Hp."""
+    """D = 2 S H' R^-1 (z - h(x)), z on the line from z0 to z1 at `share`. Writes d and yv, Hx, Hp."""
     output(t, x, u, p, on, yv, Hx, Hp)
     n = x.shape[0]
     for i in range(n):
@@ -91,7 +89,7 @@ def continuous_embedding(
     W: Any, R: Any, angle: Any, integration: int, substeps: int, work: Any, flow_work: Any,
     X: Any, S_out: Any, D: Any, info: Any,
 ) -> None:  # fmt: skip
-    """xhat' = f + 2 S H' R^-1 (z - h), S' = F S + S F' - 2 S H' R^-1 H S + W (Raol (47), (49), (50)).
+    """Xhat' = f + 2 S H' R^-1 (z - h), S' = F S + S F' - 2 S H' R^-1 H S + W (Raol (47), (49), (50)).
 
     t (N,), u (N, inputs), y (N, outputs; NaN is missing), x0 (n,), S0, W (n, n), R (N, outputs): spectral density over
     the step that ends at a sample (row 0: at the first sample), angle (outputs,). RK4 in at least `substeps` parts of
@@ -197,7 +195,7 @@ def discrete_embedding(
     x0, S0. A missing channel corrects nothing. `after`: dhat from the residual after the update, as (95) is printed.
     Writes X (N, n), S_out (N, n, n), D (N, n): the jump of each sample, info (3,), and the work arrays.
     """
-    x, xs, prior, jump, us, yv, f, Fp, Hp, T, Hx, B, S, M, end, L = work
+    x, _, prior, jump, _, yv, f, _, Hp, T, Hx, B, S, M, _, L = work
     n = x0.shape[0]
     info[0], info[1], info[2] = -1, 0, -1
     for i in range(n):
@@ -255,42 +253,3 @@ def discrete_embedding(
             correction(output, t[k], x, u[k], p, on, S, y[k], y[k], 0.0, R, angle, yv, Hx, Hp, jump)
         for i in range(n):
             D[k, i] = jump[i]
-
-
-@compile_kernel(
-    nb.types.void(
-        nb.MODEL, nb.VECTOR, nb.MATRIX, nb.VECTOR, nb.INDICES, nb.MATRIX, nb.MATRIX, EMBEDDING_WORK, FLOW_WORK, nb.MATRIX
-    )
-)  # fmt: skip
-def rates_from_jumps(
-    rate: Any, t: Any, u: Any, p: Any, on: Any, X: Any, jumps: Any, work: Any, flow_work: Any, D: Any
-) -> None:
-    """The constant rate that makes each jump within its step: D = G^-1 jump, G = integral of e^(F s) over the step.
-
-    F is the model's Jacobian at the filtered state X (N, n) ahead of the step. Writes D (N, n) (0 at the first
-    sample, whose jump corrects the initial state) and the work arrays.
-    """
-    f, Fx, Fp, B, half = work[6], work[9], work[7], work[11], work[13]
-    A, E, T1, T2 = flow_work[0], flow_work[1], flow_work[2], flow_work[3]
-    n = X.shape[1]
-    for i in range(n):
-        D[0, i] = 0.0
-    for k in range(1, t.shape[0]):
-        dt = t[k] - t[k - 1]
-        rate(t[k - 1], X[k - 1], u[k - 1], p, on, f, Fx, Fp)
-        # exp([[F, I], [0, 0]] dt) holds the integral in its upper right block.
-        for i in range(n):
-            for j in range(n):
-                A[i, j] = Fx[i, j] * dt
-                A[i, n + j] = dt if i == j else 0.0
-                A[n + i, j] = 0.0
-                A[n + i, n + j] = 0.0
-        exponential(A, E, T1, T2)
-        for i in range(n):
-            half[i, 0] = jumps[k, i]
-            for j in range(n):
-                B[i, j] = E[i, n + j]
-        # solve() takes all columns; only the first is of interest.
-        singular = solve(B, half) == 0
-        for i in range(n):
-            D[k, i] = jumps[k, i] / dt if singular else half[i, 0]

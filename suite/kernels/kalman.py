@@ -178,7 +178,13 @@ def filtered(
     P, Pp, Phi, Qd = (np.zeros((N, n, n)) for _ in range(4))
     H, K = np.zeros((N, m, n)), np.zeros((N, m, n))
     nu, s = np.zeros((N, m)), np.ones((N, m))
-    work = (np.zeros((m, program.parameters)), np.zeros(n), np.zeros(n), *(np.zeros((n, n)) for _ in range(3)), np.zeros(m))
+    work = (
+        np.zeros((m, program.parameters)),
+        np.zeros(n),
+        np.zeros(n),
+        *(np.zeros((n, n)) for _ in range(3)),
+        np.zeros(m),
+    )
     failed = ekf(
         program.rate, program.output, *arrays(record.t, record.u), model.linear_inputs, *arrays(record.y),
         *arrays(X if nominal is None else nominal), int(nominal is not None), *arrays(x0, P0), model.values,

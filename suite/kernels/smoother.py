@@ -115,7 +115,8 @@ def adjoint(
 class Smoothed:
     """A smoothed run: x (N, n), P (N, n, n); w (N, n) the process noise of the step that ends at a sample, P_w its
     covariance (zero at the first sample); before, after (N, n) the adjoint ahead of and behind each measurement, with
-    Before (N, n, n) the information ahead of it."""
+    Before (N, n, n) the information ahead of it.
+    """
 
     x: Array
     P: Array
