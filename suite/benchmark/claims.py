@@ -1,0 +1,60 @@
+"""The ledger of published numbers beside ours; what can be computed in seconds is computed on the spot."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from suite.benchmark.table import grid
+from suite.benchmark.table_one import PUBLISHED, Setting, numbers
+
+SOURCE = "Raol and others (2016), IJERSTE 5(7), Table 1"
+
+
+def ledger() -> list[dict[str, Any]]:
+    """Rows {"id", "source", "setting", "published", "ours", "tolerance", "status"}; the tolerance is relative.
+
+    Status: "reproduced" (within the tolerance), "differs", "setting not published" (there is no number to compare).
+    """
+    base = numbers(Setting())
+    setting = f"a reconstruction, one of many: {Setting().sentence}"
+    rows = [
+        _row(f"table1-{method}-{what}", setting, published, base[method, what], 0.01)
+        for (method, what), published in PUBLISHED.items()
+    ]
+    printed = PUBLISHED["generalized", "J"] / PUBLISHED["conventional", "J"]
+    ratio = base["generalized", "J"] / base["conventional", "J"]
+    rows.append(_row("table1-J-ratio", setting, printed, ratio, 0.02))
+    rows.append(
+        _row(
+            "table1-alpha",
+            "alpha of the generalized estimator; ours is chosen to meet a3 and J",
+            None,
+            Setting().alpha,
+            0,
+        )
+    )
+    return rows
+
+
+def _row(name: str, setting: str, published: float | None, ours: float, tolerance: float) -> dict[str, Any]:
+    status = "setting not published"
+    if published is not None:
+        status = "reproduced" if abs(ours - published) <= tolerance * abs(published) else "differs"
+    values = {"published": published, "ours": ours, "tolerance": tolerance, "status": status}
+    return {"id": name, "source": SOURCE, "setting": setting, **values}
+
+
+def text(rows: list[dict[str, Any]]) -> str:
+    """The ledger as a table."""
+    heading = ["claim", "published", "ours", "tolerance", "status"]
+    lines = [
+        [
+            r["id"],
+            "" if r["published"] is None else f"{r['published']:.5g}",
+            f"{r['ours']:.5g}",
+            f"{r['tolerance']:.0%}",
+            r["status"],
+        ]
+        for r in rows
+    ]
+    return f"{SOURCE}\n\n" + grid([heading, *lines])
