@@ -10,6 +10,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -148,6 +149,8 @@ class _Text:
         import pandas as pd
 
         wanted = [self.names.index(name) for name in columns]
+        # Every digit counts; newer versions read them all without being asked, and warn when asked.
+        exact: Any = {} if int(pd.__version__.partition(".")[0]) >= 3 else {"float_precision": "round_trip"}
         try:
             frame = pd.read_csv(
                 io.StringIO(self.text),
@@ -161,8 +164,8 @@ class _Text:
                 index_col=False,
                 na_values=sorted(MISSING),
                 skipinitialspace=True,
-                float_precision="round_trip",
                 engine="c",
+                **exact,
             )
         except (ValueError, pd.errors.ParserError):
             raise self.offence(columns) from None
