@@ -24,8 +24,9 @@ from suite.discovery.result import (
 from suite.model import Input, Model, Output, Parameter
 from suite.record import Record
 from suite.report import failure, figures
-from suite.report.canvas import svg, thinned, timeline
+from suite.report.canvas import thinned, timeline
 from suite.report.page import with_sd, write_figures, write_report
+from suite.report.vector import svg
 
 HOSTILE = '<script>alert("x")</script>&$a_b$'
 

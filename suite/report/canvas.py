@@ -1,23 +1,17 @@
-"""What every figure shares: colours, thinning that keeps spikes, a time axis for several runs, and accessible SVG."""
+"""What every figure shares: colours, thinning that keeps spikes, and a time axis for several runs."""
 
 from __future__ import annotations
 
-import html
-import io
-import re
 import textwrap
-import threading
-import warnings
 
-import matplotlib
 import numpy as np
 import numpy.typing as npt
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path
-from matplotlib.text import Text
 
 from suite.model import Model
 from suite.record import Record
@@ -38,10 +32,6 @@ INK, BLUE, SKY, ORANGE, VERMILION, GREEN, GREY = (
 WIDTH = 9.0
 MOST = 4000
 BAND95, BAND99 = 1.96, 2.576
-
-# Colours, fonts and hashes of ids come from matplotlib's global settings, so one figure is written at a time.
-_WRITING = threading.Lock()
-_SETTINGS = {"svg.fonttype": "path", "svg.hashsalt": "unmodelled", "path.simplify": False}
 
 
 def new_figure(title: str, description: str, height: float) -> Figure:
@@ -74,7 +64,7 @@ def dressed(ax: Axes, xlabel: str, ylabel: str, title: str = "") -> Axes:
 
 def legend_below(fig: Figure, *axes: Axes) -> None:
     """One legend under the panels, where it can hide no data; each name once."""
-    entries = {}
+    entries: dict[str, Artist] = {}
     for ax in axes:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
@@ -91,9 +81,8 @@ def thinned(values: Array, most: int = MOST) -> Index:
         return np.arange(N, dtype=np.int64)
     stretch = -(-N // max(most // 2, 1))
     rows = -(-N // stretch)
-    table = np.full(rows * stretch, np.nan)
-    table[:N] = values
-    table = table.reshape(rows, stretch)
+    table = np.full((rows, stretch), np.nan)
+    table.ravel()[:N] = values
     missing = np.isnan(table)
     low = np.where(missing, np.inf, table).argmin(axis=1)
     high = np.where(missing, -np.inf, table).argmax(axis=1)
@@ -134,6 +123,20 @@ def line(ax: Axes, record: Record, x: Array, y: Array, color: str, label: str, m
         ax.plot(x[kept], y[kept], color=color, linewidth=1.4, label=label if k == 0 else None, zorder=3)
 
 
+def samples(
+    ax: Axes, record: Record, x: Array, y: Array, color: str, label: str, most: int = MOST, size: float = 3.2
+) -> None:
+    """Measured values over time: dots, or where they are too many a line from each smallest to each largest.
+
+    Dots at the extremes alone would look like two bands with nothing between them.
+    """
+    if len(record) <= most:
+        dots(ax, x, y, color, label, size)
+        return
+    for k, kept in enumerate(thinned_runs(record, y, most)):
+        ax.plot(x[kept], y[kept], color=color, linewidth=0.8, label=label if k == 0 else None, zorder=2)
+
+
 def dots(ax: Axes, x: Array, y: Array, color: str, label: str, size: float = 3.2) -> None:
     """Points as one path of tiny strokes with round ends: a fifth of the size of one SVG element a point."""
     known = np.isfinite(x) & np.isfinite(y)
@@ -149,48 +152,3 @@ def dots(ax: Axes, x: Array, y: Array, color: str, label: str, size: float = 3.2
     ax.add_artist(points)
     ax.update_datalim(corners)
     ax.autoscale_view()
-
-
-def svg(fig: Figure, name: str = "figure") -> str:
-    """The figure as an SVG element with title and description, without reference to anything outside itself.
-
-    `name` goes in front of every id, so that several can stand in one page.
-    """
-    title, description = " ".join(fig.get_suptitle().split()), " ".join(str(fig.get_label()).split())
-    for text in fig.findobj(Text):
-        # A name such as a$b is text, not a formula.
-        if isinstance(text, Text):
-            text.set_parse_math(False)
-    buffer = io.StringIO()
-    with _WRITING, matplotlib.rc_context(_SETTINGS), warnings.catch_warnings():
-        # A letter that the font lacks is drawn as a box.
-        warnings.filterwarnings("ignore", message="Glyph .* missing")
-        fig.savefig(buffer, format="svg", metadata={"Date": None})
-    drawn = buffer.getvalue()
-    drawn = drawn[drawn.index("<svg") :]
-    drawn = re.sub(r"<metadata>.*?</metadata>", "", drawn, flags=re.DOTALL)
-    drawn = re.sub(r"<!--.*?-->", "", drawn, flags=re.DOTALL)
-    drawn = re.sub(r'\bd="([^"]*)"', lambda path: f'd="{_compact(path[1])}"', drawn)
-    drawn = re.sub(r'\bid="', f'id="{name}-', drawn)
-    drawn = re.sub(r'href="#', f'href="#{name}-', drawn)
-    drawn = drawn.replace("url(#", f"url(#{name}-")
-    head = f'<svg role="img" aria-label="{html.escape(title)}" '
-    words = f"<title>{html.escape(title)}</title><desc>{html.escape(description)}</desc>"
-    opening, rest = drawn.removeprefix("<svg ").split(">", 1)
-    # The page sets the size; width and height in points would not shrink on a telephone.
-    opening = re.sub(r'\s(width|height)="[^"]*pt"', "", " " + opening).strip()
-    rest = re.sub(r">\s+<", "><", rest).strip()
-    return f"{head}{opening}>{words}{rest}"
-
-
-def _compact(path: str) -> str:
-    """A path with two decimals (a hundredth of a point), tiny strokes as 'h.01'."""
-    short = re.sub(r"-?\d+\.\d+", lambda number: f"{float(number[0]):.2f}".rstrip("0").rstrip("."), path)
-    short = re.sub(r"\s*([MLQCz])\s*", r"\1", short)
-    return re.sub(r"M(\S+) (\S+)L(\S+) \2(?=M|$)", _stroke, short)
-
-
-def _stroke(match: re.Match[str]) -> str:
-    if abs(float(match[3]) - float(match[1])) > 0.2:
-        return match[0]
-    return f"M{match[1]} {match[2]}h.01"

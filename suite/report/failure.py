@@ -185,10 +185,11 @@ def state_map(model: Model, misfit: Discrepancy) -> Figure | None:
 
 
 def _hatched(ax: Axes, ea: Array, eb: Array, cells: npt.NDArray[np.bool_]) -> None:
-    boxes = [
-        Path.unit_rectangle().vertices * [ea[i + 1] - ea[i], eb[j + 1] - eb[j]] + [ea[i], eb[j]]
+    """One path for all hatched cells, which is a tenth of the size of one for each."""
+    corners = [
+        [(ea[i], eb[j]), (ea[i + 1], eb[j]), (ea[i + 1], eb[j + 1]), (ea[i], eb[j + 1]), (ea[i], eb[j])]
         for i, j in np.argwhere(cells)
     ]
-    if boxes:
-        path = Path.make_compound_path(*(Path(box, Path.unit_rectangle().codes) for box in boxes))
+    if corners:
+        path = Path.make_compound_path(*(Path(box, closed=True) for box in corners))
         ax.add_patch(PathPatch(path, facecolor="none", edgecolor="#777777", hatch="////", linewidth=0, zorder=3))

@@ -22,12 +22,11 @@ from suite.report.canvas import (
     SKY,
     VERMILION,
     Array,
-    dots,
     dressed,
     legend_below,
     line,
     new_figure,
-    thinned_runs,
+    samples,
     time_label,
     timeline,
     wrapped,
@@ -62,8 +61,7 @@ def compare(model: Model, record: Record, comparison: Comparison, most: int = MO
     for j, name in enumerate(names):
         upper = fig.add_subplot(grid[2 * j])
         lower = fig.add_subplot(grid[2 * j + 1], sharex=upper)
-        kept = np.concatenate(thinned_runs(record, record.y[:, j], most))
-        dots(upper, t[kept], record.y[kept, j], "#6A6A6A", "measured")
+        samples(upper, record, t, record.y[:, j], "#6A6A6A", "measured", most)
         Y = finite(comparison.Y[:, j])
         line(upper, record, t, Y, VERMILION, "simulated", most)
         _framed(upper, record.y[:, j], Y)
@@ -72,15 +70,15 @@ def compare(model: Model, record: Record, comparison: Comparison, most: int = MO
         dressed(upper, "", name, said + (f", {_times(times)} the noise" if np.isfinite(times) else ""))
         upper.tick_params(labelbottom=False)
         lower.axhspan(-BAND95, BAND95, color=GREEN, alpha=0.25, linewidth=0, label="noise, 95 %")
-        kept = np.concatenate(thinned_runs(record, e[:, j], most))
-        dots(lower, t[kept], e[kept, j], BLUE, "measured - simulated", 2.4)
-        dressed(lower, time_label(record, model) if j == len(names) - 1 else "", "residual\n/ noise sd")
+        samples(lower, record, t, e[:, j], BLUE, "measured - simulated", most, 2.4)
+        dressed(lower, time_label(record, model) if j == len(names) - 1 else "", "residual / noise")
         for ax in (upper, lower):
             for k, (run, first, last) in enumerate(comparison.worst):
                 label = "worst intervals" if k == 0 else None
                 ax.axvspan(first + offsets[run], last + offsets[run], color=ORANGE, alpha=0.2, linewidth=0, label=label)
         upper.margins(x=0.01)
         shown += [upper, lower]
+    fig.align_ylabels(shown)
     legend_below(fig, *shown)
     return fig
 
@@ -174,13 +172,13 @@ def waterfall(ledger: Ledger) -> Figure:
     """Error of each step by output, on the fitted and on held-out data, with the noise as a line."""
     steps, names = ledger.steps, list(ledger.steps[0].model.outputs)
     first, last = steps[0].comparison, steps[-1].comparison
-    ratio = max(last.error[name] / s if s > 0 else np.inf for name, s in zip(names, last.sigma, strict=True))
+    ratio, worst = max((last.error[n] / s if s > 0 else np.inf, n) for n, s in zip(names, last.sigma, strict=True))
     title = (
         "The error falls to the noise"
         if ratio < 1.15 and len(steps) > 1
         else "The error is noise from the start"
         if ratio < 1.15
-        else f"The error ends at {_times(ratio)} the noise"
+        else f"The error of {worst} ends at {_times(ratio)} the noise"
         if np.isfinite(ratio)
         else "The error of each step"
     )

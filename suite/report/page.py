@@ -19,10 +19,12 @@ from suite.discovery.result import Candidate, Ledger, Step, Verdict
 from suite.effect import Effect
 from suite.model import Model
 from suite.report import failure, figures
-from suite.report.canvas import BAND99, MOST, svg
+from suite.report.canvas import BAND99, MOST
 from suite.report.figures import SEPARABLE, change, plain
+from suite.report.vector import share_letters, svg
 
-LARGEST = 1_900_000
+# Points of all curves together, at about 17 bytes each.
+POINTS = 50_000
 
 
 def write_report(
@@ -38,13 +40,7 @@ def write_report(
     `command` is the line that repeats the run, `sentence` the judgement (the ledger's if empty), `effects` the library
     by id, from which each effect takes its sentence of physics, `date` the day it was made (today if empty).
     """
-    most = MOST
-    text = _page(ledger, command, sentence, effects or {}, date, most)
-    while len(text.encode()) > LARGEST and most > 250:
-        # Many steps or outputs: fewer points a curve, of which the spikes still are the last to go.
-        most //= 2
-        text = _page(ledger, command, sentence, effects or {}, date, most)
-    _replace(Path(path), text)
+    _replace(Path(path), _page(ledger, command, sentence, effects or {}, date))
     return Path(path)
 
 
@@ -112,7 +108,7 @@ def with_sd(value: float, sd: float) -> str:
     return f"{value:.4g} ± {short}" if digits is None else f"{value:.{digits}f} ± {short}"
 
 
-def _page(ledger: Ledger, command: str, sentence: str, effects: Mapping[str, Effect], date: str, most: int) -> str:
+def _page(ledger: Ledger, command: str, sentence: str, effects: Mapping[str, Effect], date: str) -> str:
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
         autoescape=True,
@@ -121,13 +117,21 @@ def _page(ledger: Ledger, command: str, sentence: str, effects: Mapping[str, Eff
         lstrip_blocks=True,
     )
     environment.filters |= {"number": number, "plain": plain}
-    steps = [_step(ledger, k, effects, most) for k in range(len(ledger.steps))]
+    # Each output has three curves, a discrepancy about seven.
+    curves = sum(3 * len(step.model.outputs) + 7 for step in ledger.steps)
+    most = int(np.clip(POINTS / curves, 200, MOST))
+    drawn = {"waterfall": svg(figures.waterfall(ledger), "waterfall")}
+    for k, step in enumerate(ledger.steps):
+        drawn |= {f"step{k}-{name}": svg(fig, f"step{k}-{name}") for name, fig in _drawn(ledger, step, most).items()}
+    shared, letters = share_letters(drawn)
+    steps = [_step(ledger, k, effects) for k in range(len(ledger.steps))]
     columns = list(dict.fromkeys(name for row in ledger.history for name in row))
     return environment.get_template("report.html.j2").render(
         model=ledger.steps[-1].model.name,
         sentence=sentence or ledger.sentence,
         keys=_keys(ledger),
-        waterfall=Markup(svg(figures.waterfall(ledger), "waterfall")),
+        letters=Markup(letters),
+        figures={name: Markup(text) for name, text in shared.items()},
         steps=steps,
         columns=columns,
         rows=[[_cell(row.get(name)) for name in columns] for row in ledger.history],
@@ -167,17 +171,16 @@ def _keys(ledger: Ledger) -> list[dict[str, object]]:
     ]
 
 
-def _step(ledger: Ledger, at: int, effects: Mapping[str, Effect], most: int) -> dict[str, Any]:
+def _step(ledger: Ledger, at: int, effects: Mapping[str, Effect]) -> dict[str, Any]:
     step = ledger.steps[at]
     previous = ledger.steps[at - 1].model if at else None
-    drawn = _drawn(ledger, step, most)
     verdict = step.verdict
     return {
         "number": at,
+        "prefix": f"step{at}-",
         "change": change(ledger.steps, at),
         "equations": _equations(step.model, previous),
         "comparison": step.comparison,
-        "figures": {name: Markup(svg(fig, f"step{at}-{name}")) for name, fig in drawn.items()},
         "discrepancy": step.discrepancy,
         "verdict": verdict,
         "candidates": [] if verdict is None else [_candidate(c, k, effects) for k, c in enumerate(verdict.plausible)],
