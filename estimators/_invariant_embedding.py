@@ -116,7 +116,8 @@ def continuous(
     start = prior.P0 / 2.0 if S0 is None else S0
     continuous_embedding(
         program.rate, program.output, *arrays(record.t, record.u), model.linear_inputs,
-        *arrays(record.y, prior.x0, start), model.values, program.all_off(), *arrays(W, Rk), angles(model), int(riccati == "integration"), 4,
+        *arrays(record.y, prior.x0, start), model.values, program.all_off(), *arrays(W, Rk), angles(model),
+        int(riccati == "integration"), 4,
         embedding_workspace(n, program.inputs, program.parameters, program.outputs_count), flow_workspace(n),
         X, S, D, info,
     )  # fmt: skip

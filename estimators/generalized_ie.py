@@ -19,7 +19,8 @@ class GeneralizedIE(Estimator):
     The extended Kalman-Bucy filter with P = 2S and process-noise density (alpha Q)^-1; dhat is its gain times the
     innovation, a rate, not the minimiser of J. Q (weight of J, (n,) or (n, n)), R (outputs,) (spectral density) and S0
     (n, n) override the prior's: density 1/(q_scale Q), R_sample dt (with the error of z between samples), P0/2.
-    `riccati`: by "transition" matrix or by "integration". A channel counts over a step only if it was measured at both of its ends.
+    `riccati`: by "transition" matrix or by "integration". A channel counts over a step only
+    if it was measured at both of its ends.
     """
 
     name = "generalized-ie"

@@ -83,7 +83,8 @@ def _told(estimate: Estimate, record: Record, gamma: float, found: float) -> Est
     """The estimate with gamma, the threshold, the existence interval and the sign of J in its report and note."""
     J = sum(estimate.J or (0.0, 0.0))
     report = dict(estimate.report or {})
-    exists = min(float(report.get("definite until", record.t[-1])), float(report.get("failed at", record.t[-1])))
+    ends = [float(report[key]) for key in ("definite until", "failed at") if key in report]
+    exists = min([*ends, float(record.t[-1])])
     report |= {"gamma": gamma, "threshold": found, "exists until": exists, "J sign": "+" if J >= 0.0 else "-"}
     where = f"gamma = {gamma:.4g}, threshold {found:.4g}, J {'>=' if J >= 0.0 else '<'} 0"
     return replace(estimate, report=report, note=f"{estimate.note}; {where}" if estimate.note else where)
@@ -119,7 +120,8 @@ class SemiRobustAdaptive(Estimator):
 class SemiRobustAdaptiveDiscrete(Estimator):
     """SRA, discrete time. Raol (2016), (92)-(95).
 
-    dhat is taken from the residual before the update, unless `residual` is "after" (as (95) is printed). As `sra`; R (outputs,) is the variance of a sample.
+    dhat is taken from the residual before the update, unless `residual` is "after" (as (95) is printed).
+    As `sra`; R (outputs,) is the variance of a sample.
     """
 
     name = "sra-discrete"

@@ -130,7 +130,7 @@ def continuous_embedding(
             own = speed(Fx) + max(abs(gain), math.sqrt(abs(settled)))
             h = min(dt / substeps, GAIN_REACH / own if own > 0.0 else dt)
             parts += 1
-            if not math.isfinite(own) or h * MOST_PARTS < dt - done or parts > MOST_PARTS:
+            if not math.isfinite(own) or parts > MOST_PARTS:
                 info[0], info[1] = k, 3 if math.isfinite(own) else 1
                 return
             h = (dt - done) / math.ceil((dt - done) / h - 1e-9)
