@@ -1,4 +1,4 @@
-"""A yellow whiffle ball falls 47 m, filmed twice: gravity alone is not enough. Measured."""
+"""A whiffle ball falls 47 m, filmed twice: gravity alone is not enough. Measured."""
 
 from pathlib import Path
 
@@ -11,8 +11,8 @@ SOURCE = Source(
     folder="ball_drops",
     origin="github.com/briandesilva/discovery-of-physics-from-data, data/Ball_drops_data.xls, a CSV file a drop",
     sha256={
-        "yellow_whiffle_ball_drop1.csv": "0cd36c9d8d91dc906de6b88d98f54030990d74165b1d161e69dcf13c7ec18877",
-        "yellow_whiffle_ball_drop2.csv": "ae91a8ca0b293812600bfce64f59eb8fa53103f2255a15c96b0c976e063fc5e6",
+        "whiffle_ball_1_drop1.csv": "11abd9df6a74d2e9b4c9800d7adbb7187d5af20858ec0536b34125ea14f04398",
+        "whiffle_ball_1_drop2.csv": "c9f8dd0fa7ef5419a84702e5ba1bd3867b0675c43d9b5a3d85220d76e9a12e19",
     },
 )
 
@@ -30,7 +30,7 @@ CASE = Case(
         states={"z": "v", "v": "-g"},
         parameters={"g": Parameter(9.81, fixed=True, unit="m/s^2")},
         outputs={"z": Output("z", column="height")},
-        initial={"z": Initial(47.0, estimate=True), "v": Initial(0.0)},
+        initial={"z": Initial(47.0, estimate=True), "v": Initial(0.0, estimate=True)},
     ),
     measured=measured,
     noises=(0.0,),

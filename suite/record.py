@@ -45,6 +45,9 @@ class Record:
     source: str = field(default="record", compare=False)
 
     def __post_init__(self) -> None:
+        for name in ("t", "u", "y"):
+            # The kernels take contiguous writable numbers; a column of a table may be neither.
+            object.__setattr__(self, name, np.require(getattr(self, name), np.float64, ["C", "W"]))
         N = len(self.t)
         if self.u.ndim != 2 or self.y.ndim != 2 or len(self.u) != N or len(self.y) != N:
             shapes = f"t {self.t.shape}, u {self.u.shape}, y {self.y.shape}"

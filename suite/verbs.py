@@ -21,7 +21,7 @@ from suite.discovery.loop import discover as loop
 from suite.discovery.result import Verdict
 from suite.discovery.verdict import diagnose as verdict_on
 from suite.discovery.words import effect as effect_words
-from suite.discovery.words import value_sd
+from suite.discovery.words import value_sd, weight
 from suite.errors import InputError
 from suite.files import write_whole
 from suite.model import Model, Parameter
@@ -142,7 +142,7 @@ def _say(found: Verdict) -> int:
     for candidate in found.plausible:
         label = ", ".join(effect_words(named) for named in candidate.effects)
         apart = "" if candidate.separation is None else f", delta^2 {candidate.separation:.3g}"
-        print(f"  {candidate.weight:5.2f}  {label}{apart}")
+        print(f"  {weight(candidate.weight):>6}  {label}{apart}")
     for sentence in found.advice:
         print(f"- {sentence}")
     held = found.error.get("held_out")

@@ -113,7 +113,7 @@ class Problem:
             for name, inner in term.inner.items():
                 unit = term.scale(name, spread, length)
                 low.append(inner.low * unit)
-                nyquist = np.pi / float(np.median(self.record.runs[0].dt))
+                nyquist = np.pi / self.step
                 high.append(min(inner.high * unit, nyquist) if inner.of == "frequency" else inner.high * unit)
         return np.array(low), np.array(high)
 
@@ -129,6 +129,11 @@ class Problem:
     def length(self) -> float:
         """The longest run, in units of time."""
         return max(float(run.t[-1] - run.t[0]) for run in self.record.runs)
+
+    @cached_property
+    def step(self) -> float:
+        """The median step of the first run."""
+        return float(np.median(self.record.runs[0].dt))
 
     def columns(self, active: Sequence[int]) -> Index:
         """Indices of the parameters that a fit with these candidates moves."""
@@ -162,7 +167,7 @@ class Problem:
             np.zeros(n), np.zeros(ny), np.zeros((ny, n)), np.zeros((ny, program.parameters)),
             np.zeros((n, n)), np.zeros((n, n)), np.zeros(wide), np.zeros(wide), np.zeros(wide), np.zeros(n),
         )  # fmt: skip
-        Q = q * 10.0 * self.weights**2 * float(np.median(record.runs[0].dt))
+        Q = q * 10.0 * self.weights**2 * self.step
         failed = prediction_errors(
             program.rate, program.output, record.t, record.u, self.model.linear_inputs, record.y, record.bounds,
             np.ascontiguousarray(point.x0), point.p, on, moved, Q, self.R, self.angles, self.substeps,

@@ -98,8 +98,12 @@ def levenberg_marquardt(
             except np.linalg.LinAlgError:
                 damping *= 10.0
                 continue
+            whole = step / scale[index]
+            promised = -(2.0 * g[index] @ whole + whole @ A[np.ix_(index, index)] @ whole)
+            if promised < 0.1 * tolerance:
+                break
             trial = theta.copy()
-            trial[index] += step / scale[index]
+            trial[index] += whole
             there = problem.unpack(trial, point, columns)
             tried = problem.run(there, q, active, columns)
             cost = problem.cost(tried, there, columns)

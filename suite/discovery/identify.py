@@ -222,6 +222,8 @@ def refit(problem: Problem, parent: Hypothesis, active: tuple[int, ...], start: 
             p[places[:count]] = 0.0
         first = start.q if start.q > 0 else LEVELS[-2]
         tried.append(homotopy(problem, Point(level.point.x0, p), active, first=first, tolerance=0.1))
+        if tried[-1].gain <= ALARM and np.isfinite(tried[-1].exact.L):
+            break
     return min(tried, key=lambda hypothesis: hypothesis.exact.L)
 
 

@@ -140,6 +140,7 @@ def _bind(model: Model, effect: Effect, equation: str, names: _Names) -> Iterato
         letters = {letter: filled[role] for letter, role in effect.roles.items()}
         fresh = {name: names.fresh(name) for name in (*effect.coefficients, *effect.inner)}
         text = re.sub(r"[A-Za-z_]\w*", lambda m: (letters | fresh).get(m.group(), m.group()), effect.term)
+        text = re.sub(r"abs\(\(([^()]*)\)\)", r"abs(\1)", text)
         yield Term(
             effect,
             equation,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +21,6 @@ Array = npt.NDArray[np.float64]
 
 BINS = 12
 LAGS = 20
-FOLLOWED = 0.2  # of a held-out run: what its unknown first state is estimated from
 ENOUGH = 60  # samples of a single run from which the last part is held out
 HELD = 0.3  # of a single run: the part that is held out
 
@@ -48,7 +47,11 @@ def rmse(record: Record, Y: Array, names: list[str], rows: slice = slice(None)) 
     """Root mean square of measured minus simulated, by output."""
     with np.errstate(over="ignore", invalid="ignore"):
         square = (record.y[rows] - Y[rows]) ** 2
-    return {name: float(np.sqrt(np.nanmean(square[:, j]))) for j, name in enumerate(names)}
+    there = ~np.isnan(record.y[rows])
+    return {
+        name: float(np.sqrt(np.mean(square[there[:, j], j]))) if there[:, j].any() else np.nan
+        for j, name in enumerate(names)
+    }
 
 
 def compare(model: Model, record: Record, Y: Array | None = None, sigma: Array | None = None) -> Comparison:
@@ -199,24 +202,33 @@ def where(found: Discrepancy, record: Record, names: list[str]) -> str:
     return f"The model fails in {found.equation}' for {found.variable} from {a:.3g} to {b:.3g}."
 
 
-def split(record: Record) -> tuple[Record, Record, float] | None:
-    """What is fitted and what is held out: the last of several runs, else the last 30 % of a long one.
+@dataclass(frozen=True)
+class Split:
+    """What is fitted (`train`) and what is judged: the samples of `judged` from number `first`; its unknown first state
+    is fitted to the share `lead` of it."""
 
-    Returns (training record, judged record, how much of the judged record leads in), or None for short records. The
-    judged record of a single run is the whole of it; its first 70 % lead in and are not judged.
+    train: Record
+    judged: Record
+    lead: float
+    first: int
+
+
+def split(record: Record) -> Split | None:
+    """Hold out the last of several runs, else the last 30 % of a long one; None for short records.
+
+    A held-out run's unknown first state is fitted to it, with all parameters fixed; the held-out part of a single run
+    is simulated through from the first sample.
     """
     runs = record.runs
     if len(runs) > 1:
-        return join(runs[:-1]), runs[-1], FOLLOWED
+        return Split(join(runs[:-1]), runs[-1], 1.0, 0)
     if len(record) < ENOUGH:
         return None
-    return record.part(0, int((1 - HELD) * len(record))), record, 1.0 - HELD
+    first = int((1 - HELD) * len(record))
+    return Split(record.part(0, first), record, first / len(record), first)
 
 
-def held_out_error(model: Model, judged: Record, lead: float) -> dict[str, float]:
-    """Free-run error of a fitted model on the part of the judged record behind what leads in."""
-    Y = simulate(model, judged, follow=lead)
-    first = int(lead * len(judged)) if lead > 0.5 else 0
-    return rmse(judged, Y, list(model.outputs), slice(first, None))
-
-
+def held_out_error(model: Model, parts: Split) -> dict[str, float]:
+    """Free-run error of a fitted model on what was held out."""
+    Y = simulate(model, parts.judged, follow=parts.lead)
+    return rmse(parts.judged, Y, list(model.outputs), slice(parts.first, None))

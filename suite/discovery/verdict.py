@@ -27,7 +27,8 @@ PLAUSIBLE = 0.99  # weight that the stated set holds
 SEPARABLE = 16.0  # delta^2 below which data cannot tell two hypotheses apart
 SHOWN = 6  # rivals whose separation is computed
 REMAINS = 0.15  # of the error beyond the noise: what may remain for an effect to count as found, though not alone
-WHITE = 0.001  # Ljung-Box p below which a residual is not white
+DECISIVE = 10.0  # of the criterion: what a further effect must gain where the residual does not become white
+NEAR = 2.5  # times the best one's remaining error: what a rival may leave where nothing explains all of it
 
 
 def diagnose(model: Model, record: Record, effects: Mapping[str, Effect], absolute: bool = False) -> Verdict:
@@ -48,21 +49,18 @@ def judge(found: Search) -> tuple[Verdict, Hypothesis]:
     problem, base = found.problem, found.base
     names = list(problem.model.outputs)
     everything = [base, *found.fitted]
-    exact = [found.criterion(h) for h in everything]
-    best = everything[int(np.argmin(exact))]
+    best = min(everything, key=found.criterion)
     settled = not needs_more(found, best)
-    if settled:
-        values = np.array(exact)
-    else:
-        # Something remains unexplained: what is left counts as process noise, alike for all, before they are compared.
-        values = np.array([found.criterion(h, h.best) for h in everything])
-        best = everything[int(np.argmin(values))]
+    if not settled:
+        everything = _thrifty(found, everything)
+    values = np.array([found.criterion(h, h.exact if settled else h.best) for h in everything])
+    best = everything[int(np.argmin(values))]
     weights = np.exp(-0.5 * (values - np.nanmin(values)))
     weights = np.where(np.isfinite(weights), weights, 0.0) / np.nansum(weights)
     ranked = sorted(zip(weights.tolist(), everything, values.tolist(), strict=True), key=lambda item: -item[0])
     kind = _kind(found, best, settled, ranked)
     named = best if kind in ("missing_effect", "ambiguous") else base
-    plausible = _plausible(found, ranked, named) if kind != "adequate" else []
+    plausible = _plausible(found, ranked, named, settled) if kind != "adequate" else []
     count = len(problem.columns(()))
     correlations = misfit.whiteness(problem.record, _residual(problem, base.exact), names)
     error = _errors(found, named)
@@ -80,6 +78,21 @@ def judge(found: Search) -> tuple[Verdict, Hypothesis]:
     advice = _advice(found, named, ranked, verdict) if kind == "ambiguous" else ()
     verdict = replace(verdict, advice=advice, sentence=words.sentence(verdict, problem, settled))
     return replace(verdict, seconds=found.seconds + time.perf_counter() - began), named
+
+
+def _thrifty(found: Search, everything: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Where something remains whatever is added, a further effect must earn its place: by DECISIVE over its subsets.
+
+    What is left then counts as process noise, alike for all, before hypotheses are compared.
+    """
+
+    def value(hypothesis: Hypothesis) -> float:
+        return found.criterion(hypothesis, hypothesis.best)
+
+    return [
+        h for h in everything
+        if not any(set(s.active) < set(h.active) and value(s) < value(h) + DECISIVE for s in everything)
+    ]  # fmt: skip
 
 
 def _kind(found: Search, best: Hypothesis, settled: bool, ranked: Sequence[tuple[float, Hypothesis, float]]) -> Kind:
@@ -180,17 +193,21 @@ def _errors(found: Search, named: Hypothesis) -> dict[str, Any]:
     parts = misfit.split(problem.record)
     if parts is None:
         return error
-    train, judged, lead = parts
     held: dict[str, dict[str, float]] = {}
     for label, hypothesis in (("before", found.base), ("after", named)):
         # The same structure, fitted again to the training part alone, from the file's values.
-        fitted = fit(amended(problem, hypothesis, fitted=False), train)
-        held[label] = misfit.held_out_error(fitted.model, judged, lead)
+        fitted = fit(amended(problem, hypothesis, fitted=False), parts.train)
+        held[label] = misfit.held_out_error(fitted.model, parts)
     return {**error, "held_out": held}
 
 
-def _plausible(found: Search, ranked: Sequence[tuple[float, Hypothesis, float]], best: Hypothesis) -> list[Candidate]:
-    """The hypotheses that hold 99 % of the weight, and any other that the data cannot tell from the best."""
+def _plausible(
+    found: Search, ranked: Sequence[tuple[float, Hypothesis, float]], best: Hypothesis, settled: bool
+) -> list[Candidate]:
+    """The hypotheses that hold 99 % of the weight, and any other that the data cannot tell from the best.
+
+    Where the best leaves more than noise, weights cannot rule out what explains nearly as much: that is plausible too.
+    """
     problem = found.problem
     names = list(problem.model.outputs)
     chosen, held = [], 0.0
@@ -202,6 +219,8 @@ def _plausible(found: Search, ranked: Sequence[tuple[float, Hypothesis, float]],
         if hypothesis is not best and place <= SHOWN and best.active:
             separation = distance(problem, best, hypothesis)
         near = separation is not None and separation < SEPARABLE
+        if not settled and len(hypothesis.active) <= len(best.active):
+            near = near or _excess(problem, hypothesis.exact) <= NEAR * _excess(problem, best.exact)
         if held < PLAUSIBLE or near:
             chosen.append(
                 Candidate(
@@ -263,7 +282,7 @@ def _advice(
             f"({SEPARABLE:g} is enough to tell)."
         )
     if best.gain > ALARM:
-        said.append("Part of the error stays: a second effect, or one that is not in the library, acts beside it.")
+        said.append(words.beside(verdict, [problem.terms[k].variable for k in best.active]))
     return tuple(said)
 
 

@@ -24,8 +24,8 @@ def sentence(verdict: Verdict, problem: Problem, settled: bool) -> str:
                 f"the error stays at {_numbers(verdict.error['before'])} against a noise of {_numbers(verdict.error['noise'])}."
             )
         case "missing_effect":
-            return f"Missing: {' and '.join(map(effect, verdict.effects))}, weight {verdict.weight:.2f}; {falls}."
-    rivals = [" with ".join(named.effect for named in c.effects) + f" ({c.weight:.2f})" for c in verdict.plausible]
+            return f"Missing: {' and '.join(map(effect, verdict.effects))}, weight {weight(verdict.weight)}; {falls}."
+    rivals = [" with ".join(named.effect for named in c.effects) + f" ({weight(c.weight)})" for c in verdict.plausible]
     family = _family(verdict, problem)
     common = f" In each of them {family}." if family else ""
     rest = "" if settled else " Part of the error stays unexplained."
@@ -57,6 +57,23 @@ def separate(best: Sequence[str], rival: Sequence[str], apart: float, times: str
         f"These data hardly tell {' with '.join(best)} from {' with '.join(rival)} (delta^2 = {apart:.2g}, 16 is enough); "
         f"{times} would, or a larger amplitude."
     )
+
+
+def beside(verdict: Verdict, variables: Sequence[str]) -> str:
+    """What a remainder means for the plausible set, and what would reduce it."""
+    rest = "Part of the error stays: a second effect, or one that is not in the library, acts beside it."
+    others = [" with ".join(named.effect for named in c.effects) for c in verdict.plausible[1:]]
+    if not others:
+        return rest
+    return (
+        f"{rest} Until it is found, {', '.join(others)} cannot be ruled out by weight alone; a record over another range "
+        f"of {' and '.join(dict.fromkeys(variables))} would separate them."
+    )
+
+
+def weight(value: float) -> str:
+    """A weight to two digits; what is below them is said to be."""
+    return f"{value:.2f}" if value >= 0.01 else "< 0.01"
 
 
 def _falls(verdict: Verdict) -> str:

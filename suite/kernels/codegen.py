@@ -22,11 +22,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import sympy
+from numba.core.types.function_type import CompileResultWAP
 from sympy.printing.pycode import PythonCodePrinter
 
 from suite.expressions import symbol
 from suite.kernels import cache
 from suite.kernels.cache import numba
+from suite.kernels.types import MODEL_FUNCTION
 
 Array = npt.NDArray[np.float64]
 
@@ -56,11 +58,11 @@ class Program:
 
     @cached_property
     def rate(self) -> Any:
-        return self.module.rate
+        return _address(self.module.rate)
 
     @cached_property
     def output(self) -> Any:
-        return self.module.output
+        return _address(self.module.output)
 
     def all_off(self) -> npt.NDArray[np.int64]:
         """The gate switches, all off, (gates,)."""
@@ -78,6 +80,11 @@ class Program:
         y, Hx, Hp = np.zeros(ny), np.zeros((ny, self.n)), np.zeros((ny, self.parameters))
         self.output(float(t), _vector(x), _vector(u), _vector(p), self.all_off(), y, Hx, Hp)
         return y, Hx, Hp
+
+
+def _address(function: Any) -> Any:
+    """The compiled function as its address: a kernel would look a dispatcher up anew at every call, for a millisecond."""
+    return CompileResultWAP(function.get_compile_result(MODEL_FUNCTION))
 
 
 def _vector(values: Sequence[float] | Array) -> Array:
