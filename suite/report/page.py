@@ -26,6 +26,12 @@ from suite.report.vector import share_letters, svg
 # Points of all curves together, at about 17 bytes each.
 POINTS = 50_000
 
+DETECTION = {
+    "lambda": "likelihood that a free model error gains (lambda)",
+    "threshold": "alarm above",
+    "ljung_box_p": "chance of a residual so regular if it were white (Ljung-Box)",
+}
+
 
 def write_report(
     ledger: Ledger,
@@ -186,7 +192,7 @@ def _step(ledger: Ledger, at: int, effects: Mapping[str, Effect]) -> dict[str, A
         "candidates": [] if verdict is None else [_candidate(c, k, effects) for k, c in enumerate(verdict.plausible)],
         "lookalikes": [] if verdict is None else _lookalikes(verdict),
         "parameters": _parameters(step, previous),
-        "detection": [] if verdict is None else [(plain(k), v) for k, v in verdict.detection.items()],
+        "detection": [] if verdict is None else [(DETECTION.get(k, plain(k)), v) for k, v in verdict.detection.items()],
         "smallest": [] if verdict is None else [(plain(k), v) for k, v in verdict.smallest_detectable.items()],
         "whiteness": _whiteness(ledger, step),
     }
