@@ -46,7 +46,8 @@ def density(prior: Prior, q_scale: float, Q: Array | None) -> Array:
     """
     if Q is None:
         return np.diag(prior.Q) / q_scale
-    return np.linalg.inv(np.diag(Q) if np.ndim(Q) == 1 else np.asarray(Q, dtype=np.float64))
+    weight = np.diag(Q) if np.ndim(Q) == 1 else np.asarray(Q)
+    return np.linalg.inv(weight).astype(np.float64)
 
 
 def cost(

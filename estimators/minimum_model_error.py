@@ -39,17 +39,22 @@ class MinimumModelError(Estimator):
         prior = prior_of(record)
         inverse = density(prior, q_scale, Q)
         noise = inverse / alpha
-        status, note, path, rounds = "ok", "", None, 0
+        # The noise acts half at the start of a step, half at its end (`spread`); the model runs between the two.
+        half = np.concatenate([0.5 * record.dt, [0.0]])[:, None]
+        status, note, rounds = "ok", "", 0
         run = filtered(model, record, prior.x0, prior.P0, noise, prior.R, spread=True)
         if run.failed_at is not None:
             when = f"the filter diverged at t = {record.t[run.failed_at]:.4g} s; its last estimate is held from there"
             x = held(run.x, run.failed_at)
             return Estimate(x=x, d=np.zeros_like(x), status="diverged", note=when)
         result = smoothed(run)
+        path, kick = result.x, result.after @ noise
         for rounds in range(1, ROUNDS + 1):
-            share = 1.0 if path is None or rounds <= FULL else 0.5
-            path = result.x if path is None else path + share * (result.x - path)
-            run = filtered(model, record, prior.x0, prior.P0, noise, prior.R, spread=True, nominal=path)
+            share = 1.0 if rounds <= FULL else 0.5
+            path = path + share * (result.x - path)
+            kick = kick + share * (result.after @ noise - kick)
+            around = (path, path + half * kick)
+            run = filtered(model, record, prior.x0, prior.P0, noise, prior.R, spread=True, around=around)
             trial = smoothed(run) if run.failed_at is None else None
             if trial is None or not np.all(np.isfinite(trial.x)):
                 status, note = "diverged", f"Gauss-Newton left every bound in round {rounds}; the round before is given"

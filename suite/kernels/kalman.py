@@ -27,21 +27,22 @@ EKF_WORK = nb.types.Tuple((nb.MATRIX, nb.VECTOR, nb.VECTOR, nb.MATRIX, nb.MATRIX
 
 @compile_kernel(
     nb.INT(
-        nb.MODEL, nb.MODEL, nb.VECTOR, nb.MATRIX, nb.VECTOR, nb.MATRIX, nb.MATRIX, nb.INT, nb.VECTOR, nb.MATRIX,
-        nb.VECTOR, nb.INDICES, nb.MATRIX, nb.INT, nb.VECTOR, nb.VECTOR, nb.INDICES, WORK, EKF_WORK,
+        nb.MODEL, nb.MODEL, nb.VECTOR, nb.MATRIX, nb.VECTOR, nb.MATRIX, nb.MATRIX, nb.MATRIX, nb.INT, nb.VECTOR,
+        nb.MATRIX, nb.VECTOR, nb.INDICES, nb.MATRIX, nb.INT, nb.VECTOR, nb.VECTOR, nb.INDICES, WORK, EKF_WORK,
         nb.MATRIX, nb.CUBE, nb.MATRIX, nb.CUBE, nb.CUBE, nb.CUBE, nb.CUBE, nb.CUBE, nb.MATRIX, nb.MATRIX,
     )
 )  # fmt: skip
 def ekf(
-    rate: Any, output: Any, t: Any, u: Any, linear: Any, y: Any, nominal: Any, around: int, x0: Any, P0: Any,
-    p: Any, on: Any, Q: Any, spread: int, R: Any, angle: Any, none: Any, work: Any, ekf_work: Any,
+    rate: Any, output: Any, t: Any, u: Any, linear: Any, y: Any, nominal: Any, departure: Any, around: int,
+    x0: Any, P0: Any, p: Any, on: Any, Q: Any, spread: int, R: Any, angle: Any, none: Any, work: Any, ekf_work: Any,
     X: Any, P: Any, Xp: Any, Pp: Any, Phi: Any, Qd: Any, H: Any, K: Any, nu: Any, s: Any,
 ) -> int:  # fmt: skip
     """Run over one run; returns -1, or the first sample at which a number is no longer finite.
 
-    t (N,), u (N, inputs), y (N, outputs; NaN is missing), nominal (N, n): where to linearise if `around`, else the
-    filter's own estimates; Q (n, n) density of the process noise, added as Q dt at the end of a step, or (`spread`)
-    as dt (Phi Q Phi' + Q)/2, its integral over the step to second order; R (outputs,), angle (outputs,) 1 wraps.
+    t (N,), u (N, inputs), y (N, outputs; NaN is missing), nominal, departure (N, n): where to linearise the output
+    at a sample and the step from it if `around`, else at the filter's own estimates; Q (n, n) density of the process
+    noise, added as Q dt at the end of a step, or (`spread`) as dt (Phi Q Phi' + Q)/2, its integral over the step to
+    second order; R (outputs,), angle (outputs,) 1 wraps.
     Writes X, P filtered, Xp, Pp predicted, Phi, Qd of the step into a sample (N, n, n), H and K (N, outputs, n),
     nu and s (N, outputs; 0 and 1 where missing), and the work arrays.
     """
@@ -58,11 +59,11 @@ def ekf(
         if k > 0:
             dt = t[k] - t[k - 1]
             for i in range(n):
-                base[i] = nominal[k - 1, i] if around != 0 else x[i]
+                base[i] = departure[k - 1, i] if around != 0 else x[i]
                 # x becomes the distance from the point of linearisation.
                 x[i] -= base[i]
             advance(rate, t[k - 1], dt, u[k - 1], u[k], linear, p, on, none, 1, base, T, work)
-            # x- = f(nominal) + Phi (x - nominal),  P- = Phi P Phi' + Qd
+            # x- = f(departure) + Phi (x - departure),  P- = Phi P Phi' + Qd
             for i in range(n):
                 for j in range(n):
                     base[i] += T[i, j] * x[j]
@@ -164,12 +165,13 @@ class Filtered:
 
 def filtered(
     model: Model, record: Record, x0: Array, P0: Array, Q: Array, R: Array,
-    *, spread: bool = False, nominal: Array | None = None,
+    *, spread: bool = False, around: tuple[Array, Array] | None = None,
 ) -> Filtered:  # fmt: skip
     """The extended Kalman filter over one run, from x0, P0 at its first sample, which is used too.
 
     Q (n,) or (n, n): density of the process noise; R (outputs,): variance of a sample; `spread`: the noise acts
-    through the step, not at its end; `nominal` (N, n): linearise there (one step of the iterated smoother).
+    through the step, not at its end; `around`, two (N, n): linearise the outputs and the
+    steps there (iterated smoother).
     """
     program, N = model.program, len(record)
     n, m = program.n, program.outputs_count
@@ -187,7 +189,7 @@ def filtered(
     )
     failed = ekf(
         program.rate, program.output, *arrays(record.t, record.u), model.linear_inputs, *arrays(record.y),
-        *arrays(X if nominal is None else nominal), int(nominal is not None), *arrays(x0, P0), model.values,
+        *arrays(*(around or (X, X))), int(around is not None), *arrays(x0, P0), model.values,
         program.all_off(), *arrays(density), int(spread), *arrays(R), angles(model), np.zeros(0, dtype=np.int64),
         workspace(n, program.inputs, program.parameters, 0), work, X, P, Xp, Pp, Phi, Qd, H, K, nu, s,
     )  # fmt: skip
