@@ -286,7 +286,11 @@ def test_divergence_is_drawn() -> None:
     low, high = fig.axes[0].get_ylim()
     assert -5 < low < found.record.y.min() < found.record.y.max() < high < 5
     assert "<title>" in svg(fig)
-    assert "<title>" in svg(figures.waterfall(replace(found, steps=steps)))
+    fig = figures.waterfall(replace(found, steps=steps))
+    assert "<title>" in svg(fig)
+    steep = replace(found.steps[0], comparison=replace(found.steps[0].comparison, error={"pos": 5.0}))
+    fig = figures.waterfall(replace(found, steps=(steep, found.steps[1])))
+    assert {"0.01", "0.1", "1"} <= {label.get_text() for label in fig.axes[0].get_yticklabels()}
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from suite.discovery.result import Candidate, Comparison, Ledger, Step, Verdict
 from suite.model import Model
@@ -193,6 +194,7 @@ def waterfall(ledger: Ledger) -> Figure:
         if any(name in step.held_out for step in steps):
             series["error on held-out data"] = (ORANGE, [step.held_out.get(name, np.nan) for step in steps])
         width = 0.7 / len(series)
+        small = 9.5 if len(series) * len(steps) <= 8 else 7.5
         top = max((v for _, values in series.values() for v in values if np.isfinite(v)), default=noise or 1.0)
         logarithmic = noise > 0 and top / noise > 20
         for k, (label, (color, values)) in enumerate(series.items()):
@@ -202,11 +204,14 @@ def waterfall(ledger: Ledger) -> Figure:
             for place, value in zip(places, values, strict=True):
                 if not np.isnan(value):
                     said, height = (f"{value:.3g}", value) if np.isfinite(value) else ("diverged", noise)
-                    ax.annotate(said, (place, height), (0, 2), textcoords="offset points", ha="center", fontsize=9.5)
+                    ax.annotate(said, (place, height), (0, 2), textcoords="offset points", ha="center", fontsize=small)
         if noise > 0:
             ax.axhline(noise, color=INK, linestyle="--", linewidth=1.3, label="noise", zorder=4)
         if logarithmic:
             ax.set_yscale("log")
+            # The scale's own labels are formulas, and text is drawn as text.
+            ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            ax.yaxis.set_minor_formatter(NullFormatter())
             ax.set_ylim(noise / 3, 3 * top)
         else:
             ax.set_ylim(0, 1.18 * max(top, noise))
