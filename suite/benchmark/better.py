@@ -108,7 +108,7 @@ def experiment(measured: tuple[str, ...], noise: float, seed: int) -> tuple[Mode
 
 
 def white_weight(model: Model, record: Record) -> float:
-    """alpha of largest likelihood: the innovations' of the EKF with process-noise density Q / alpha."""
+    """The alpha of largest likelihood: the innovations' of the EKF with process-noise density Q / alpha."""
     prior = record.prior
     assert prior is not None
 

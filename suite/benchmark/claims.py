@@ -44,17 +44,17 @@ def _row(name: str, setting: str, published: float | None, ours: float, toleranc
     return {"id": name, "source": SOURCE, "setting": setting, **values}
 
 
+def cells(rows: list[dict[str, Any]]) -> list[list[str]]:
+    """The ledger as rows of text; the first is the heading."""
+
+    def number(value: float | None) -> str:
+        return "" if value is None else f"{value:.5g}"
+
+    heading = ["claim", "published", "ours", "tolerance", "status"]
+    lines = [[r["id"], number(r["published"]), number(r["ours"]), f"{r['tolerance']:.0%}", r["status"]] for r in rows]
+    return [heading, *lines]
+
+
 def text(rows: list[dict[str, Any]]) -> str:
     """The ledger as a table."""
-    heading = ["claim", "published", "ours", "tolerance", "status"]
-    lines = [
-        [
-            r["id"],
-            "" if r["published"] is None else f"{r['published']:.5g}",
-            f"{r['ours']:.5g}",
-            f"{r['tolerance']:.0%}",
-            r["status"],
-        ]
-        for r in rows
-    ]
-    return f"{SOURCE}\n\n" + grid([heading, *lines])
+    return f"{SOURCE}\n\n" + grid(cells(rows))

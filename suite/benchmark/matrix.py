@@ -82,8 +82,7 @@ def run(
     versions = _versions()
     with Progress("cells", len(tasks), quiet=quiet) as progress:
         for task, outcome in pool.run(tasks, jobs, limit):
-            cell: Cell = task.label
-            row = outcome
+            cell, row = task.label, outcome
             if isinstance(outcome, pool.Failure):
                 row = {"status": "time-out" if outcome.status == "time-out" else "error", "reason": outcome.reason}
             hashes = {"plugin_hash": keys.plugin(cell.estimator), "case_hash": keys.case(cell.case)}

@@ -102,8 +102,8 @@ def named(case: Case, truth: Truth, estimate: Estimate) -> dict[str, Any]:
 
 def _cosines(model: Model, x: Array, d: Array) -> dict[str, float]:
     shapes = {text.format(s): f(x[:, j]) for j, s in enumerate(model.states) for text, f in SHAPES.items()}
-    size = np.linalg.norm(d)
-    return {name: float(abs(v @ d) / max(np.linalg.norm(v) * size, 1e-300)) for name, v in shapes.items()}
+    size = float(np.linalg.norm(d))
+    return {s: float(abs(v @ d)) / max(float(np.linalg.norm(v)) * size, 1e-300) for s, v in shapes.items()}
 
 
 def nees(error: Array, P: Array) -> float:
@@ -134,7 +134,7 @@ def nis(model: Model, record: Record, estimate: Estimate) -> float | None:
         H = model.output_jacobian(record.t[k], estimate.x[k], record.u[k])[seen]
         gap = np.diag(R[seen]) - H @ estimate.P[k] @ H.T
         # Where the filter follows the measurement exactly (S >> R) the difference is lost in rounding.
-        if np.linalg.eigvalsh(gap / R[seen].max())[0] < 1e-9:
+        if np.linalg.eigvalsh(gap / np.max(R[seen]))[0] < 1e-9:
             continue
         terms.append(float(r @ np.linalg.solve(gap, r)) / seen.sum())
     return float(np.mean(terms)) if len(terms) > len(record) // 2 else None

@@ -96,5 +96,5 @@ def parse(table: dict[str, Any], name: str, source: str) -> Plan:
         raise InputError(f"{source}: variants = {table['variants']!r}; expected some of {', '.join(VARIANTS)}")
     if table.get("seeds", 1) < 1 or table.get("limit", 1) <= 0 or min(table.get("noises", [0])) < 0:
         raise InputError(f"{source}: seeds and limit must be positive, noises not negative; mend the plan")
-    grown = {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}
-    return Plan(name=name, **{"sentence": "", **grown})
+    grown: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}
+    return Plan(name, **{"sentence": "", **grown})

@@ -102,7 +102,7 @@ def run(tasks: Iterable[Task], jobs: int, limit: float) -> Iterator[tuple[Task, 
                 else:
                     continue
                 task, worker.task = worker.task, None
-                if isinstance(outcome, Failure) and outcome.status != "error" or not worker.process.is_alive():
+                if (isinstance(outcome, Failure) and outcome.status != "error") or not worker.process.is_alive():
                     worker.end()
                     workers[workers.index(worker)] = _Worker()
                     if task is None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from types import TracebackType
+from typing import Any
 
 
 class Progress:
@@ -14,7 +15,7 @@ class Progress:
         self.what, self.total, self.done = what, total, 0
         self.quiet = quiet or total == 0
         self.start = self.said = time.monotonic()
-        self.bar = None
+        self.bar: Any = None
 
     def __enter__(self) -> Progress:
         if not self.quiet and sys.stderr.isatty():

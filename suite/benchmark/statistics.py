@@ -23,7 +23,7 @@ def interval(values: Array, level: float = 0.95) -> tuple[float, float, float]:
 
 
 def paired_ratio(mine: Mapping[int, float], reference: Mapping[int, float]) -> tuple[float, float, float] | None:
-    """Median of mine / reference over common seeds with its bootstrap interval, resampling pairs; None without pairs."""
+    """Median of mine / reference over common seeds, with its bootstrap interval; None without pairs."""
     common = [seed for seed in mine if np.isfinite(mine[seed]) and np.isfinite(reference.get(seed, np.nan))]
     ratios = [mine[seed] / reference[seed] for seed in common if reference[seed] > 0]
     return interval(np.array(ratios)) if ratios else None

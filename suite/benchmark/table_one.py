@@ -91,6 +91,7 @@ def solve(setting: Setting, alpha: float) -> tuple[Record, Truth, Estimate]:
     """The record of x0 and noise as set, its truth, and what the estimator makes of it."""
     case: Case = plugins.cases()["paper-cubic"]
     assert case.experiment is not None
+    dt = case.experiment.dt
     case = replace(case, experiment=replace(case.experiment, x0=setting.x0))
     record, truth = case.simulate(setting.noise, seed=0)
     columns = [list(case.deficient.outputs).index(name) for name in setting.measured]
@@ -101,7 +102,7 @@ def solve(setting: Setting, alpha: float) -> tuple[Record, Truth, Estimate]:
     given = _held(record) if setting.held else record
     given = given.with_prior(default_prior(model, record, truth.noise[columns]))
     # The discrete filter takes the variance of a sample, which is the spectral density over the step.
-    step = case.experiment.dt if setting.estimator.endswith("-discrete") else 1.0
+    step = dt if setting.estimator.endswith("-discrete") else 1.0
     Q, R, S0 = np.array(setting.Q), np.full(len(columns), setting.R / step), setting.S0 * np.eye(2)
     estimate = plugins.estimators()[setting.estimator].estimate(model, given, alpha=alpha, Q=Q, R=R, S0=S0)
     if setting.held:

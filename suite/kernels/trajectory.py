@@ -24,7 +24,8 @@ def trajectory(
 ) -> None:  # fmt: skip
     """X (N, n), whose first row is given, and D (N, n) = truth - model; `mover` carries the state over each sample.
 
-    With `held` the last n of the mover's parameters r are the push, set to D[k] at each sample. Writes X, D, T, r, work.
+    With `held` the last n of the mover's parameters r are the push, set to D[k] at each sample.
+    Writes X, D, T, r, work.
     """
     f, _, g, _, Fx, Fp, _, _, _ = work
     n = X.shape[1]
