@@ -29,10 +29,10 @@ def threshold(F: Array, G: Array, C: Array, slowest: float = 0.0) -> float:
     eigenvalues = np.linalg.eigvals(F)
     pace = float(np.max(np.abs(eigenvalues))) + 1e-12
     if np.max(eigenvalues.real) >= -1e-9 * pace:
-        if slowest <= 0.0:
-            return float("inf")
+        if slowest <= 0.0 or not G.size:
+            return float("inf") if G.size else 0.0
         return max(gain(float(w)) for w in np.geomspace(slowest, max(1e3 * pace, 1e3 * slowest), 400))
-    low = max(gain(float(w)) for w in [0.0, *np.abs(eigenvalues)])
+    low = max(gain(float(w)) for w in [0.0, *np.abs(eigenvalues)]) if G.size else 0.0
     if low == 0.0:
         return 0.0
     high = 2.0 * low
@@ -67,7 +67,10 @@ def _settings(
     """Gamma and the bounded-real threshold at the first state; without a gamma, `gamma_ratio` thresholds."""
     prior = prior_of(record)
     inverse = density(prior, q_scale, Q)
-    root: Array = np.linalg.cholesky(inverse + 1e-300 * np.eye(len(inverse))).astype(np.float64)
+    # Only equations with a source count; definitions have none.
+    counted = np.flatnonzero(np.diag(inverse) > 0)
+    root = np.zeros((len(inverse), len(counted)))
+    root[counted] = np.linalg.cholesky(inverse[np.ix_(counted, counted)])
     spectral = prior.R * float(np.median(record.dt)) if R is None else np.asarray(R, dtype=np.float64)
     F = model.jacobian(record.t[0], prior.x0, record.u[0])
     H = model.output_jacobian(record.t[0], prior.x0, record.u[0])
@@ -85,7 +88,8 @@ def _told(estimate: Estimate, record: Record, gamma: float, found: float) -> Est
     report = dict(estimate.report or {})
     ends = [float(report[key]) for key in ("definite until", "failed at") if key in report]
     exists = min([*ends, float(record.t[-1])])
-    report |= {"gamma": gamma, "threshold": found, "exists until": exists, "J sign": "+" if J >= 0.0 else "-"}
+    bound: float | str = found if np.isfinite(found) else "infinite"
+    report |= {"gamma": gamma, "threshold": bound, "exists until": exists, "J sign": "+" if J >= 0.0 else "-"}
     where = f"gamma = {gamma:.4g}, threshold {found:.4g}, J {'>=' if J >= 0.0 else '<'} 0"
     return replace(estimate, report=report, note=f"{estimate.note}; {where}" if estimate.note else where)
 

@@ -177,3 +177,50 @@ def test_on_a_linear_plant_the_filters_agree() -> None:
     assert unscented(linear, record, PRIOR).mean_nis == pytest.approx(
         extended(linear, record, PRIOR).mean_nis, rel=1e-9
     )
+
+
+@pytest.mark.parametrize("name", sorted(NAMES - {"sra", "sra-discrete"}))
+def test_other_units_give_the_same_answer(name: str) -> None:
+    """With the states in thousandths of their unit, and the data and prior with them, the estimates scale to 1e-6."""
+    metres = Model(
+        name="oscillator in metres",
+        states={"p": "v", "v": "F - 0.3*v - 2*p"},
+        inputs={"F": Input("F", "linear")},
+        outputs={"a": Output("p", "a")},
+        initial={"p": Initial(0.0), "v": Initial(0.0)},
+    )
+    millimetres = Model(
+        name="oscillator in millimetres",
+        states={"p": "v", "v": "1000*F - 0.3*v - 2*p"},
+        inputs={"F": Input("F", "linear")},
+        outputs={"a": Output("p", "a")},
+        initial={"p": Initial(0.0), "v": Initial(0.0)},
+    )
+    full = simulated()
+    prior = Prior(PRIOR.x0, PRIOR.P0, PRIOR.R[:1], PRIOR.Q)
+    record = Record(full.t, full.u, full.y[:, :1], prior=prior)
+    scaled = Prior(1e3 * prior.x0, 1e6 * prior.P0, 1e6 * prior.R, 1e6 * prior.Q)
+    one = METHODS[name].estimate(metres, record)
+    other = METHODS[name].estimate(millimetres, Record(full.t, full.u, 1e3 * full.y[:, :1], prior=scaled))
+    assert one.d is not None
+    assert other.d is not None
+    np.testing.assert_allclose(other.x / 1e3, one.x, rtol=1e-6, atol=1e-8)
+    np.testing.assert_allclose(other.d / 1e3, one.d, rtol=1e-6, atol=1e-7)
+    if one.J is not None:
+        assert pytest.approx(one.J, rel=1e-6) == other.J
+
+
+@pytest.mark.parametrize("name", sorted(NAMES))
+def test_a_model_without_suspects_has_no_model_error_of_its_own(name: str) -> None:
+    """Where no equation may be wrong every method still runs, and the disturbance estimators say d = 0."""
+    model = Model(
+        name="decay", states={"x": "-x"}, outputs={"z": Output("x", "z")}, initial={"x": Initial(1.0)}, suspect=()
+    )
+    t = np.arange(30) * 0.1
+    y = np.exp(-t)[:, None] + 0.01 * np.random.default_rng(0).standard_normal((30, 1))
+    prior = Prior(np.ones(1), np.zeros((1, 1)), np.array([1e-4]), np.zeros(1))
+    found = METHODS[name].estimate(model, Record(t, np.zeros((30, 0)), y, prior=prior))
+    check(found, 30, 1)
+    assert found.status == "ok"
+    assert found.d is not None
+    assert np.all(found.d == 0.0)
