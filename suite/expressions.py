@@ -13,6 +13,7 @@ import math
 import re
 import warnings
 from collections.abc import Callable, Collection, Sequence
+from typing import Any
 
 import sympy
 from sympy.printing.str import StrPrinter
@@ -50,7 +51,7 @@ TOKEN = re.compile(r"\*\*|[-+~*/%@,()\[\]{}]|[^-+~*/%@,()\[\]{}\s]+")
 OPENING = frozenset(["(", "[", "{", "+", "-", "~", "*", "/", "%", "@", ",", "**"])  # after these a sign is unary
 RESERVED = frozenset(FUNCTIONS) | frozenset(CONSTANTS) | {TIME}
 
-_FLOAT_OF: dict[str, Callable[..., float]] = {
+_FLOAT_OF: dict[str, Callable[..., Any]] = {
     **{name: getattr(math, name) for name in FUNCTIONS if hasattr(math, name)},
     "abs": abs,
     "sign": lambda x: float((x > 0) - (x < 0)),
@@ -102,10 +103,10 @@ class _Plain(StrPrinter):  # type: ignore[misc]
     def _print_Abs(self, expr: sympy.Expr) -> str:
         return f"abs({self._print(expr.args[0])})"
 
-    def _print_Min(self, expr: sympy.Expr) -> str:
+    def _print_Min(self, expr: Any) -> str:
         return self._pairs("min", expr.args)
 
-    def _print_Max(self, expr: sympy.Expr) -> str:
+    def _print_Max(self, expr: Any) -> str:
         return self._pairs("max", expr.args)
 
     def _pairs(self, name: str, arguments: Sequence[sympy.Expr]) -> str:
@@ -171,7 +172,7 @@ class _Translator:
 
     def visit(self, node: ast.expr) -> sympy.Expr:
         match node:
-            case ast.Constant(value=value) if type(value) in (int, float):
+            case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
                 return self.number(value)
             case ast.Name(id=name):
                 return self.name(name)
@@ -227,7 +228,7 @@ class _Translator:
             node = node.left
         return self.bounded(sympy.Mul(self.visit(node), *reversed(factors)))
 
-    def bounded(self, expression: sympy.Expr) -> sympy.Expr:
+    def bounded(self, expression: Any) -> sympy.Expr:
         """The expression with long exact numbers in floating point; what overflows is refused."""
         if expression.is_Rational:
             if max(abs(expression.p), expression.q) < LONG:
@@ -258,7 +259,7 @@ class _Translator:
             raise self.refuse(f"{name} is a function", f"write {name}(...)")
         raise self.refuse(f"{name!r} is not declared", "add it to [inputs] or [parameters]")
 
-    def power(self, base: sympy.Expr, exponent: sympy.Expr) -> sympy.Expr:
+    def power(self, base: Any, exponent: sympy.Expr) -> sympy.Expr:
         if not exponent.is_number:
             return self.bounded(base**exponent)
         value = self.finite(lambda: float(exponent))

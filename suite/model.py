@@ -8,7 +8,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -169,9 +169,7 @@ class Model:
         """dh/dx, (outputs, n)."""
         return self.program.outputs(t, x, u, self.values if p is None else p)[1]
 
-    def step(
-        self, t: float, x: Array, u: Sequence[float], dt: float, u_next: Sequence[float] | None = None
-    ) -> Array:
+    def step(self, t: float, x: Array, u: Sequence[float], dt: float, u_next: Sequence[float] | None = None) -> Array:
         """The state one sample later, (n,); inputs with a linear hold run from `u` to `u_next`."""
         return self.transition(t, x, u, dt, u_next)[0]
 
@@ -181,12 +179,14 @@ class Model:
         """The state one sample later, (n,), and its derivative by the state now, (n, n)."""
         start = np.asarray(u, dtype=np.float64)
         end = start if u_next is None else np.asarray(u_next, dtype=np.float64)
-        return transition(self.program, t, np.asarray(x, dtype=np.float64), start, end, self.linear_inputs, self.values, dt)
+        return transition(
+            self.program, t, np.asarray(x, dtype=np.float64), start, end, self.linear_inputs, self.values, dt
+        )
 
     def plus(self, equation: str, term: str, parameters: Mapping[str, Parameter]) -> Model:
         """The model with `term` (text that opens with its sign) added to a state's rate or to an output."""
         if equation in self.states:
-            changed = {"states": {**self.states, equation: f"{self.states[equation]} {_signed(term)}"}}
+            changed: dict[str, Any] = {"states": {**self.states, equation: f"{self.states[equation]} {_signed(term)}"}}
         elif equation in self.outputs:
             output = self.outputs[equation]
             grown = replace(output, equation=f"{output.equation} {_signed(term)}")
@@ -204,6 +204,11 @@ class Model:
     def with_disturbance(self, states: Sequence[str]) -> Model:
         """The model with an additive disturbance state, constant by itself, in the rate of each named state."""
         extra = {f"d_{name}": name for name in states}
+        for name in extra:
+            if name in self._declared:
+                raise ModelError(
+                    f"{self.source}: a disturbance state would be called {name}, as one is; rename that one"
+                )
         rates = {name: f"{text} + d_{name}" if name in states else text for name, text in self.states.items()}
         initial = {**self.initial, **{name: Initial(0.0, estimate=True) for name in extra}}
         return replace(self, states={**rates, **dict.fromkeys(extra, "0")}, initial=initial)
@@ -226,7 +231,7 @@ class Model:
 
     def _check_names(self) -> None:
         if not self.states:
-            raise ModelError(f"{self.source}: no states; add a table [states] with one rate a line, such as x = \"-k*x\"")
+            raise ModelError(f'{self.source}: no states; add a table [states] with one rate a line, such as x = "-k*x"')
         seen: dict[str, str] = {}
         tables = {"states": self.states, "parameters": self.parameters, "inputs": self.inputs}
         for table, entries in tables.items():

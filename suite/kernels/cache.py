@@ -14,7 +14,7 @@ from typing import Any
 for _name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
-import numba  # noqa: E402  (after the thread settings, which are read at import)
+import numba as numba  # noqa: E402  (after the thread settings, which are read at import)
 
 
 @cache
@@ -46,5 +46,6 @@ def compile_kernel(signature: Any) -> Any:
     if place is None:
         return numba.njit(signature, error_model="numpy", nogil=True)
     # numba reads this at compile time: all caches of the kernels then live in one folder that can be written.
-    numba.config.CACHE_DIR = str(place / f"numba-{numba.__version__}-{sys.implementation.cache_tag}")
+    config: Any = numba.config  # pyright: ignore[reportPrivateImportUsage]
+    config.CACHE_DIR = str(place / f"numba-{numba.__version__}-{sys.implementation.cache_tag}")
     return numba.njit(signature, error_model="numpy", nogil=True, cache=True)

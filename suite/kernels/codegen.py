@@ -43,10 +43,10 @@ class Gate:
 
 @dataclass(frozen=True, eq=False)
 class Program:
-    """Compiled `rate(t, x, u, p, on, dx, Fx, Fp)` and `output(t, x, u, p, on, y, Hx, Hp)`, which write their last three.
+    """Compiled `rate(t, x, u, p, on, dx, Fx, Fp)` and `output(t, x, u, p, on, y, Hx, Hp)`.
 
-    Shapes: x (n,), u (inputs,), p (parameters,), on (gates,), Fx (n, n), Fp (n, parameters), Hx (outputs, n),
-    Hp (outputs, parameters). Columns of Fp and Hp that belong to a gate are written only while it is on.
+    Both write their last three arguments. Shapes: x (n,), u (inputs,), p (parameters,), on (gates,), Fx (n, n),
+    Fp (n, parameters), Hx (outputs, n), Hp (outputs, parameters). Columns of Fp and Hp that belong to a gate are written only while it is on.
     """
 
     n: int
@@ -83,7 +83,7 @@ class Program:
 
 
 def _address(function: Any) -> Any:
-    """The compiled function as its address: a kernel would look a dispatcher up anew at every call, for a millisecond."""
+    """The compiled function as its address: a kernel would look a dispatcher up anew at every call, for 1 ms."""
     return CompileResultWAP(function.get_compile_result(MODEL_FUNCTION))
 
 
@@ -125,7 +125,7 @@ from suite.kernels.steps import sign'''
 class _Printer(PythonCodePrinter):  # type: ignore[misc]
     """Scalar code of the math module; sign and step functions are spelled out."""
 
-    def _print_Symbol(self, expr: sympy.Expr) -> str:
+    def _print_Symbol(self, expr: Any) -> str:
         # Declared names get a prefix, so that none can collide with the text around them.
         return str(expr.name) if expr.name == "t" or expr.name.startswith("_c") else f"s_{expr.name}"
 
@@ -183,7 +183,8 @@ def _function(
         targets[f"{value}[{i}]"] = expression
         targets |= {f"{by_x}[{i}, {j}]": _derivative(expression, s) for j, s in enumerate(X)}
         targets |= {f"{by_p}[{i}, {j}]": _derivative(expression, s) for j, s in enumerate(P) if s not in own}
-    lines = [f"    s_{s} = {group}[{j}]" for group, part in zip("xup", (X, U, P), strict=True) for j, s in enumerate(part)]
+    groups = zip("xup", (X, U, P), strict=True)
+    lines = [f"    s_{s} = {group}[{j}]" for group, part in groups for j, s in enumerate(part)]
     lines += _assignments(targets, "=", "    ")
     for k, terms in enumerate(gated):
         added: dict[str, sympy.Expr] = {}
@@ -208,7 +209,7 @@ def _owned(
 ) -> dict[sympy.Symbol, int]:
     """Parameters that one gate alone uses, with that gate: their columns cost nothing while it is off."""
     in_base = set().union(*(expression.free_symbols for expression in base)) if base else set()
-    users: dict[sympy.Symbol, set[int]] = {}
+    users: dict[sympy.Basic, set[int]] = {}
     for k, terms in enumerate(gated):
         for expression in terms.values():
             for s in expression.free_symbols:
@@ -220,8 +221,9 @@ def _derivative(expression: sympy.Expr, by: sympy.Symbol) -> sympy.Expr:
     """The derivative almost everywhere: steps have slope zero."""
     if not expression.has(by):
         return sympy.Integer(0)
-    slope = sympy.diff(expression, by)
-    return slope.replace(sympy.DiracDelta, lambda *_: sympy.Integer(0))
+    slope: Any = sympy.diff(expression, by)
+    flat: sympy.Expr = slope.replace(sympy.DiracDelta, lambda *_: sympy.Integer(0))
+    return flat
 
 
 def _assignments(targets: Mapping[str, sympy.Expr], operator: str, indent: str) -> list[str]:
@@ -250,7 +252,8 @@ def _load(source: str) -> ModuleType:
             handle.write(source)
         os.replace(handle.name, path)
     spec = importlib.util.spec_from_file_location(stem, path)
-    assert spec is not None and spec.loader is not None
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[stem] = module
     try:
