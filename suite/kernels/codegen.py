@@ -46,7 +46,8 @@ class Program:
     """Compiled `rate(t, x, u, p, on, dx, Fx, Fp)` and `output(t, x, u, p, on, y, Hx, Hp)`.
 
     Both write their last three arguments. Shapes: x (n,), u (inputs,), p (parameters,), on (gates,), Fx (n, n),
-    Fp (n, parameters), Hx (outputs, n), Hp (outputs, parameters). Columns of Fp and Hp that belong to a gate are written only while it is on.
+    Fp (n, parameters), Hx (outputs, n), Hp (outputs, parameters). Columns of Fp and Hp that belong to a gate are
+    written only while it is on.
     """
 
     n: int
