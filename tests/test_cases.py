@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 import cases
+from cases.whiffle_ball import SOURCE
 from suite import plugins
 from suite.errors import DataError
+from suite.model import Parameter
 
 FILES = sorted(Path(cases.__path__[0]).glob("[!_]*.py"))
 SIMULATED = [name for name, case in plugins.cases().items() if case.truth is not None]
@@ -61,8 +63,8 @@ def test_a_held_model_error_carries_the_plant() -> None:
     record, truth = case.simulate(0.0, 0)
     pushed = replace(case.deficient, initial={})
     for k in (0, 100, 200):
-        text = f"+ {truth.d[k, 0]!r}" if truth.d[k, 0] >= 0 else f"- {-truth.d[k, 0]!r}"
-        step = pushed.plus("x1", text, {}).step(record.t[k], truth.x[k], record.u[k], 0.05, record.u[k + 1])
+        push = {"push": Parameter(float(truth.d[k, 0]))}
+        step = pushed.plus("x1", "+push", push).step(record.t[k], truth.x[k], record.u[k], 0.05, record.u[k + 1])
         np.testing.assert_allclose(step, truth.x[k + 1], atol=1e-8)
 
 
@@ -89,9 +91,9 @@ def test_absent_data_are_said_with_their_source_and_checksum(tmp_path: Path) -> 
 
 def test_a_changed_file_is_refused(tmp_path: Path) -> None:
     """A file whose checksum differs is not read."""
-    (tmp_path / "ball_drops").mkdir()
-    for run in (1, 2):
-        (tmp_path / "ball_drops" / f"yellow_whiffle_ball_drop{run}.csv").write_text("t,height\n0,1\n1,2\n")
+    (tmp_path / SOURCE.folder).mkdir()
+    for name in SOURCE.sha256:
+        (tmp_path / SOURCE.folder / name).write_text("t,height\n0,1\n1,2\n")
     case = plugins.cases()["whiffle-ball"]
     assert case.measured is not None
     with pytest.raises(DataError, match="the file differs"):
