@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import warnings
 from collections.abc import Sequence
@@ -28,7 +29,9 @@ def parser() -> argparse.ArgumentParser:
     as_json.add_argument("--json", action="store_true", help="one JSON object alone on standard output")
     inputs = argparse.ArgumentParser(add_help=False)
     inputs.add_argument("model", type=Path, metavar="MODEL", help="model file (TOML)")
-    inputs.add_argument("data", type=Path, nargs="+", metavar="DATA", help="CSV, parquet or MAT; several are several runs")
+    inputs.add_argument(
+        "data", type=Path, nargs="+", metavar="DATA", help="CSV, parquet or MAT; several are several runs"
+    )
     search = argparse.ArgumentParser(add_help=False)
     search.add_argument(
         "--absolute", action="store_true", help="allow effects that depend on a state no equation depends on"
@@ -41,9 +44,13 @@ def parser() -> argparse.ArgumentParser:
     verb.add_argument("--seed", type=int, default=1, help="simulated: seed of the noise, default 1")
     verb.add_argument("--source", type=Path, metavar="DIR", help="folder of measured data that are not shipped")
     verbs.add_parser("list", parents=[as_json], help="every plug-in by kind; those not loaded, and why")
-    verb = verbs.add_parser("check", parents=[inputs, as_json], help="what is in the data, and what would spoil an analysis")
+    verb = verbs.add_parser(
+        "check", parents=[inputs, as_json], help="what is in the data, and what would spoil an analysis"
+    )
     verb.add_argument("--strict", action="store_true", help="exit with 1 if there is a finding")
-    verb = verbs.add_parser("compare", parents=[inputs, as_json], help="simulate: fit, error against noise, where it fails")
+    verb = verbs.add_parser(
+        "compare", parents=[inputs, as_json], help="simulate: fit, error against noise, where it fails"
+    )
     verb.add_argument("--refit", action="store_true", help="fit the parameters first")
     verbs.add_parser("diagnose", parents=[inputs, search, as_json], help="ranked missing effects and the verdict")
     verb = verbs.add_parser("add", parents=[as_json], help="write the model with an effect added")
@@ -52,8 +59,12 @@ def parser() -> argparse.ArgumentParser:
     verb.add_argument("--equation", metavar="NAME", help="the state in whose rate it acts, where there is a choice")
     verb.add_argument("--data", type=Path, nargs="+", default=[], metavar="DATA", help="refit to these data")
     verb.add_argument("-o", "--output", type=Path, required=True, metavar="NEW.toml", help="file to write")
-    verb = verbs.add_parser("discover", parents=[inputs, search, as_json], help="compare, diagnose, add, until it is noise")
-    verb.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="models, ledger, figures, report.html")
+    verb = verbs.add_parser(
+        "discover", parents=[inputs, search, as_json], help="compare, diagnose, add, until it is noise"
+    )
+    verb.add_argument(
+        "-o", "--output", type=Path, required=True, metavar="DIR", help="models, ledger, figures, report.html"
+    )
     benchmark.add_parser(verbs)
     return top
 
@@ -71,6 +82,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     except InputError as error:
         print(f"unmodelled: {error}", file=sys.stderr)
         return BAD_INPUT
+    except BrokenPipeError:
+        # Whoever read our output has read enough; nothing may be written at exit either.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return DONE
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
         print(f"unmodelled: {where}{error.strerror or error}; check the path and the space left", file=sys.stderr)

@@ -75,7 +75,10 @@ def list_plugins(args: argparse.Namespace) -> int:
     found = {kind: plugins.find(kind) for kind in plugins.KINDS}
     if args.json:
         return _json(
-            {kind: {"loaded": {n: _says(item) for n, item in f.loaded.items()}, "failed": f.failed} for kind, f in found.items()}
+            {
+                kind: {"loaded": {n: _says(item) for n, item in f.loaded.items()}, "failed": f.failed}
+                for kind, f in found.items()
+            }
         )
     for kind, entry in found.items():
         print(f"{kind} ({len(entry.loaded)})")
@@ -122,7 +125,13 @@ def compare(args: argparse.Namespace) -> int:
         noise = dict(zip(model.outputs, map(float, found.sigma), strict=True))
         worst = [{"run": run, "from": first, "to": last} for run, first, last in found.worst]
         return _json(
-            {"fit": dict(found.fit), "error": dict(found.error), "noise": noise, "worst": worst, "sentence": found.sentence}
+            {
+                "fit": dict(found.fit),
+                "error": dict(found.error),
+                "noise": noise,
+                "worst": worst,
+                "sentence": found.sentence,
+            }
         )
     print(found.sentence)
     return 0
@@ -160,7 +169,9 @@ def add(args: argparse.Namespace) -> int:
     effects = plugins.effects()
     if args.effect not in effects:
         close = difflib.get_close_matches(args.effect, effects, 1)
-        raise InputError(f"no effect {args.effect!r}; {f'did you mean {close[0]}? ' if close else ''}see `unmodelled list`")
+        raise InputError(
+            f"no effect {args.effect!r}; {f'did you mean {close[0]}? ' if close else ''}see `unmodelled list`"
+        )
     term = _chosen(model, args.effect, args.equation)
     record = read_record(args.data, model) if args.data else None
     start = _numbers(model, term, record)
@@ -169,10 +180,18 @@ def add(args: argparse.Namespace) -> int:
         new = fit(new, record).model
     write_model(new, args.output)
     before, after = to_toml(model).splitlines(), to_toml(new).splitlines()
-    diff = [line for line in difflib.unified_diff(before, after, str(args.model), str(args.output), lineterm="", n=1)]
+    diff = list(difflib.unified_diff(before, after, str(args.model), str(args.output), lineterm="", n=1))
     if args.json:
         values = {name: new.parameters[name].value for name in new.parameters if name not in model.parameters}
-        return _json({"file": str(args.output), "term": term.text, "equation": term.equation, "coefficients": values, "diff": diff})
+        return _json(
+            {
+                "file": str(args.output),
+                "term": term.text,
+                "equation": term.equation,
+                "coefficients": values,
+                "diff": diff,
+            }
+        )
     print("\n".join(diff))
     return 0
 
@@ -181,13 +200,15 @@ def _chosen(model: Model, effect: str, equation: str | None) -> Term:
     """The one candidate that is meant; where several are, the sentence names them."""
     if equation is not None and equation not in model.states:
         raise InputError(f"--equation {equation}: no such state; the model has {', '.join(model.states)}")
-    every = [t for t in candidates(model, {effect: plugins.effects()[effect]}, absolute=True)]
+    every = candidates(model, {effect: plugins.effects()[effect]}, absolute=True)
     terms = [t for t in every if equation in (None, t.equation)]
     if len(terms) == 1:
         return terms[0]
     if not terms:
         where = f" in {equation}'" if equation else ""
-        raise InputError(f"{effect} has no role to play{where}: no state there is what it acts on; see docs/model-file.md")
+        raise InputError(
+            f"{effect} has no role to play{where}: no state there is what it acts on; see docs/model-file.md"
+        )
     equations = sorted({t.equation for t in terms})
     if len(equations) > 1:
         raise InputError(f"{effect} could act in {', '.join(equations)}; choose with --equation")
@@ -222,8 +243,12 @@ def discover(args: argparse.Namespace) -> int:
     for number, step in enumerate(ledger.steps):
         write_model(step.model, folder / f"step{number}.toml")
     write_model(ledger.steps[-1].model, folder / "model.toml")
-    write_whole(folder / "ledger.json", json.dumps(_finite({"sentence": ledger.sentence, "steps": list(ledger.history)}), indent=1))
-    command = f"unmodelled discover {' '.join(shlex.quote(str(p)) for p in [args.model, *args.data])} -o {shlex.quote(str(folder))}"
+    write_whole(
+        folder / "ledger.json",
+        json.dumps(_finite({"sentence": ledger.sentence, "steps": list(ledger.history)}), indent=1),
+    )
+    given = " ".join(shlex.quote(str(path)) for path in [args.model, *args.data, "-o", folder])
+    command = f"unmodelled discover {given}"
     write_figures(ledger, folder / "figures")
     write_report(ledger, folder / "report.html", command, ledger.sentence, effects)
     first = ledger.steps[0].verdict
@@ -239,7 +264,9 @@ def discover(args: argparse.Namespace) -> int:
 def _table(rows: Iterable[Mapping[str, Any]]) -> None:
     """The ledger, a line a step."""
     for row in rows:
-        added = ", ".join(f"{name} = {value:.4g}" for name, value in row["added"].items()) or "the model as given, refitted"
+        added = (
+            ", ".join(f"{name} = {value:.4g}" for name, value in row["added"].items()) or "the model as given, refitted"
+        )
         errors = ", ".join(f"{name} {value:.3g}" for name, value in row["error"].items())
         held = ", ".join(f"{name} {value:.3g}" for name, value in row["held_out"].items())
         print(f"  step {row['step']}: {added}: error {errors}" + (f" (held out {held})" if held else ""))

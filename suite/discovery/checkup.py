@@ -110,8 +110,7 @@ def _undetermined(problem: Problem, level: Any, findings: list[str]) -> dict[str
     columns = problem.columns(())
     runs = len(problem.start.x0)
     states = [name for name, free in zip(problem.model.states, problem.free_x0, strict=True) if free]
-    tag = (lambda r: f" of run {r + 1}") if runs > 1 else (lambda r: "")
-    labels = [f"first {name}{tag(r)}" for r in range(runs) for name in states]
+    labels = [f"first {name}" + (f" of run {r + 1}" if runs > 1 else "") for r in range(runs) for name in states]
     labels += [problem.names[j] for j in columns]
     if not labels:
         return {"directions": [], "sd": {}}
@@ -126,7 +125,9 @@ def _undetermined(problem: Problem, level: Any, findings: list[str]) -> dict[str
             members = [labels[i] for i in np.flatnonzero(np.abs(direction) > 0.2)]
             directions.append(members)
             if not set(members) <= set(dead):
-                findings.append(f"Only a combination of {', '.join(members)} acts on the data; fix all but one of them.")
+                findings.append(
+                    f"Only a combination of {', '.join(members)} acts on the data; fix all but one of them."
+                )
     for name in dead:
         findings.append(f"{name} has no effect on what is measured; fix it or measure more.")
     free = replace(problem, scale=problem.noise(level.passed))

@@ -37,7 +37,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Pass:
-    """One pass: e (M,) errors in noise units, J (M, theta), logs = sum ln s, Y (N, outputs), X (N, n); finite or not."""
+    """One pass: e (M,) errors in noise units, J (M, theta), logs = sum ln s, Y (N, outputs), X (N, n)."""
 
     e: Array
     J: Array
@@ -208,14 +208,14 @@ class Problem:
         pull = float((pulls[np.isfinite(sd[columns])] ** 2).sum())
         if self.scale is not None:
             return float((passed.e**2).sum()) / self.scale + passed.logs + pull
-        return len(passed.e) * np.log(self.noise(passed)) + passed.logs + pull
+        return float(len(passed.e) * np.log(self.noise(passed)) + passed.logs + pull)
 
     def noise(self, passed: Pass) -> float:
         """The noise's variance in units of R: given, or the mean squared error."""
         return self.scale if self.scale is not None else max(float(np.mean(passed.e**2)), SMALLEST)
 
     def pack(self, point: Point, columns: Index) -> Array:
-        """theta of a point."""
+        """Theta of a point."""
         return np.concatenate([point.x0[:, self.free_x0].ravel(), point.p[columns]])
 
     def unpack(self, theta: Array, point: Point, columns: Index) -> Point:

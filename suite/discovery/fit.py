@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -123,7 +124,7 @@ def homotopy(
     problem: Problem, point: Point, active: Sequence[int] = (), first: float = LEVELS[0], tolerance: float = 0.05
 ) -> Hypothesis:
     """Fit at every level from `first` down to 0, each started where the last ended; the last one converged."""
-    levels = []
+    levels: list[Level] = []
     for q in (level for level in LEVELS if level <= first):
         last = q == 0.0
         level = levenberg_marquardt(problem, point, q, active, 30 if last else 8, 1e-3 if last else tolerance)
@@ -228,7 +229,7 @@ def _pace(model: Model, record: Record, path: Array) -> Array:
         if name not in model.suspects:
             continue
         slopes = []
-        for first, last in zip(bounds[:-1], bounds[1:], strict=True):
+        for first, last in pairwise(bounds.tolist()):
             good = np.isfinite(path[first:last, i])
             if good.sum() > 2:
                 slopes.append(np.gradient(path[first:last, i][good], record.t[first:last][good]))

@@ -6,14 +6,16 @@ and of each candidate's column, LM_k = (b_k' r)^2 / (s^2 |b_k|^2). It chooses wh
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
 from suite.discovery.engine import Index, Pass, Point, Problem
 from suite.discovery.fit import LEVELS, Hypothesis, Level, homotopy, polish
+from suite.discovery.library import Term
 
 Array = npt.NDArray[np.float64]
 
@@ -29,7 +31,8 @@ STARTS = (1.0, 0.3, 3.0)  # multiples of an inner scale's start that are scored
 @dataclass(frozen=True, eq=False)
 class Score:
     """One candidate's score at its best level: LM, the parameters it suggests (coefficients, inner scales), the level,
-    and the length of its projected column in noise sds a unit of its coefficient: LM = (c length)^2."""
+    and the length of its projected column in noise sds a unit of its coefficient: LM = (c length)^2.
+    """
 
     k: int
     LM: float
@@ -40,7 +43,7 @@ class Score:
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """Everything that was refitted, the base model first; criterion values beside; candidates left out as parameters."""
+    """Everything that was refitted, and the candidates that are a parameter in disguise."""
 
     problem: Problem
     base: Hypothesis
@@ -58,11 +61,11 @@ class Search:
         library = len(self.problem.terms) - len(self.absorbed)
         extra = 2.0 * len(terms) * np.log(max(library, 2))
         tones = sum(2.0 * np.log(self.frequencies) for term in terms if _is_tone(term))
-        return L + count * np.log(self.problem.count) + extra + tones
+        return float(L + count * np.log(self.problem.count) + extra + tones)
 
 
-def _is_tone(term: object) -> bool:
-    return any(inner.of == "frequency" for inner in term.inner.values())  # type: ignore[attr-defined]
+def _is_tone(term: Term) -> bool:
+    return any(inner.of == "frequency" for inner in term.inner.values())
 
 
 def search(problem: Problem) -> Search:
@@ -85,10 +88,8 @@ def needs_more(found: Search, best: Hypothesis) -> bool:
     return not np.isfinite(best.exact.L) or best.gain > ALARM
 
 
-def score(
-    problem: Problem, hypothesis: Hypothesis, skip: Iterable[int] = (), exact: bool = False
-) -> list[Score]:
-    """All candidates that are not active, best first, at the most likely level and a decade either side (or at q = 0)."""
+def score(problem: Problem, hypothesis: Hypothesis, skip: Iterable[int] = (), exact: bool = False) -> list[Score]:
+    """All candidates that are not active, best first: at the likeliest level and a decade either side, or at q = 0."""
     left_out = {*skip, *hypothesis.active}
     best: dict[int, Score] = {}
     levels = [level for level in hypothesis.levels if np.isfinite(level.L)]
@@ -107,12 +108,17 @@ def _scores_at(problem: Problem, hypothesis: Hypothesis, level: Level, left_out:
     tones = [k for k in plain if _is_tone(problem.terms[k])]
     for multiple in STARTS:
         chosen = [k for k in plain if k not in tones] if multiple == 1.0 else scaled
-        yield from _score_pass(problem, hypothesis, level, chosen, lambda k, m=multiple: _with_inner(problem, k, m))
+        yield from _score_pass(problem, hypothesis, level, chosen, partial(_with_inner, problem, multiple))
     for omega in _frequencies(problem) if tones else ():
-        yield from _score_pass(problem, hypothesis, level, tones, lambda k, w=omega: np.array([w]))
+        yield from _score_pass(problem, hypothesis, level, tones, partial(_at_frequency, float(omega)))
 
 
-def _with_inner(problem: Problem, k: int, multiple: float) -> Array:
+def _at_frequency(omega: float, k: int) -> Array:
+    """A tone's one inner scale."""
+    return np.array([omega])
+
+
+def _with_inner(problem: Problem, multiple: float, k: int) -> Array:
     """Candidate k's inner scales at a multiple of their start, within their range."""
     places = problem.places(k)[len(problem.terms[k].coefficients) :]
     low, high = problem.limits
@@ -120,7 +126,7 @@ def _with_inner(problem: Problem, k: int, multiple: float) -> Array:
 
 
 def _score_pass(
-    problem: Problem, hypothesis: Hypothesis, level: Level, chosen: list[int], inner: object
+    problem: Problem, hypothesis: Hypothesis, level: Level, chosen: list[int], inner: Callable[[int], Array]
 ) -> Iterable[Score]:
     if not chosen:
         return
@@ -131,7 +137,7 @@ def _score_pass(
         count = len(problem.terms[k].coefficients)
         coefficient_places[k] = places[:count]
         p[places[:count]] = 0.0
-        p[places[count:]] = inner(k)  # type: ignore[operator]
+        p[places[count:]] = inner(k)
     own = problem.columns(hypothesis.active)
     columns = np.concatenate([own, *(np.array(places, dtype=np.int64) for places in coefficient_places.values())])
     passed = problem.run(Point(level.point.x0, p), level.q, [*hypothesis.active, *chosen], columns)
@@ -159,7 +165,9 @@ def _score_pass(
         yield Score(k, LM, start[problem.places(k)], level.q, float(scale[0] / np.sqrt(noise)))
 
 
-def _projected(problem: Problem, passed: Pass, own: Index, width: int, prior: bool = True) -> tuple[Array, Array, Array]:
+def _projected(
+    problem: Problem, passed: Pass, own: Index, width: int, prior: bool = True
+) -> tuple[Array, Array, Array]:
     """The error and the candidates' columns with initial states and parameters projected out (prior rows included).
 
     Returns r (M + priors,), B (M + priors, candidates), and the candidates' columns before, (M, candidates).
@@ -205,7 +213,7 @@ def _frequencies(problem: Problem) -> Array:
     step = float(np.median(problem.record.runs[0].dt))
     lowest = 2.0 * np.pi / problem.length
     count = int(min(0.5 * np.pi / step / lowest, 200))
-    return lowest * np.arange(1, max(count, 1) + 1)
+    return np.asarray(lowest * np.arange(1.0, max(count, 1) + 1.0))
 
 
 def refit(problem: Problem, parent: Hypothesis, active: tuple[int, ...], start: Score) -> Hypothesis:
@@ -254,12 +262,9 @@ def _grow(found: Search) -> Search:
         # Swap and drop: the best set with each of its members replaced or removed.
         for k in grown.active if len(grown.active) == size else ():
             rest = tuple(other for other in grown.active if other != k)
-            parent = known.get(frozenset(rest))
-            if parent is None:
-                kept = Level(grown.exact.q, grown.exact.L, grown.exact.point, grown.exact.passed)
-                parent = homotopy(problem, kept.point, rest, first=0.01, tolerance=0.1)
-                known[frozenset(rest)] = parent
-            for entry in score(problem, parent, skip=found.absorbed)[:2]:
+            if frozenset(rest) not in known:
+                known[frozenset(rest)] = homotopy(problem, grown.exact.point, rest, first=0.01, tolerance=0.1)
+            for entry in score(problem, known[frozenset(rest)], skip=found.absorbed)[:2]:
                 active = (*rest, entry.k)
                 if frozenset(active) not in known:
                     known[frozenset(active)] = refit(problem, parent, active, entry)

@@ -139,8 +139,7 @@ def _bind(model: Model, effect: Effect, equation: str, names: _Names) -> Iterato
         }
         letters = {letter: filled[role] for letter, role in effect.roles.items()}
         fresh = {name: names.fresh(name) for name in (*effect.coefficients, *effect.inner)}
-        text = re.sub(r"[A-Za-z_]\w*", lambda m: (letters | fresh).get(m.group(), m.group()), effect.term)
-        text = re.sub(r"abs\(\(([^()]*)\)\)", r"abs(\1)", text)
+        text = re.sub(r"abs\(\(([^()]*)\)\)", r"abs(\1)", _renamed(effect.term, letters | fresh))
         yield Term(
             effect,
             equation,
@@ -151,6 +150,11 @@ def _bind(model: Model, effect: Effect, equation: str, names: _Names) -> Iterato
         )
 
 
+def _renamed(text: str, names: Mapping[str, str]) -> str:
+    """The term with its names replaced."""
+    return re.sub(r"[A-Za-z_]\w*", lambda match: names.get(match.group(), match.group()), text)
+
+
 def _level(model: Model, equation: str) -> str | None:
     """The parameter or input that this state relaxes to: the rate depends on (x - A) alone."""
     rate = model.rates[list(model.states).index(equation)]
@@ -159,9 +163,9 @@ def _level(model: Model, equation: str) -> str | None:
     if by_x == 0:
         return None
     for name in (*model.parameters, *model.inputs):
-        if expressions.symbol(name) in rate.free_symbols:
-            if sympy.simplify(by_x + sympy.diff(rate, expressions.symbol(name))) == 0:
-                return name
+        level = expressions.symbol(name)
+        if level in rate.free_symbols and sympy.simplify(by_x + sympy.diff(rate, level)) == 0:
+            return name
     return None
 
 
@@ -188,7 +192,7 @@ def grown(model: Model, terms: Sequence[Term], numbers: Sequence[Mapping[str, Pa
     for term, at in zip(terms, numbers, strict=True):
         names = _Names(model)
         renamed = {name: names.fresh(name) for name in term.names}
-        text = re.sub(r"[A-Za-z_]\w*", lambda m, r=renamed: r.get(m.group(), m.group()), term.text)
+        text = _renamed(term.text, renamed)
         model = model.plus(term.equation, text, {renamed[name]: at[name] for name in term.names})
     return model
 
@@ -204,7 +208,7 @@ def gates(model: Model, terms: tuple[Term, ...]) -> tuple[tuple[str, ...], tuple
     declared = set(model.states) | set(model.parameters) | set(model.inputs)
     for k, term in enumerate(terms):
         own = {name: f"c{k}__{name}" for name in term.names}
-        text = re.sub(r"[A-Za-z_]\w*", lambda m, o=own: o.get(m.group(), m.group()), term.text)
+        text = _renamed(term.text, own)
         expression = expressions.parse(text, declared | set(own.values()), f"effect {term.effect.id}")
         names += own.values()
         built.append(codegen.Gate(rates={order.index(term.equation): expression}))

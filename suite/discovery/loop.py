@@ -10,6 +10,7 @@ from suite.discovery.fit import Hypothesis, summarise
 from suite.discovery.identify import Search
 from suite.discovery.result import Ledger, Step, Verdict
 from suite.discovery.verdict import amended, investigate, judge
+from suite.discovery.words import headline
 from suite.effect import Effect
 from suite.model import Model
 from suite.record import Record
@@ -77,7 +78,9 @@ def _step(found: Search, verdict: Verdict) -> Step:
 
 def _row(number: int, step: Step, original: Model) -> dict[str, object]:
     """One line of the ledger: what the model has gained so far, and its errors."""
-    added = {name: step.model.parameters[name].value for name in step.model.parameters if name not in original.parameters}
+    added = {
+        name: step.model.parameters[name].value for name in step.model.parameters if name not in original.parameters
+    }
     return {
         "step": number,
         "equations": dict(step.model.states),
@@ -95,8 +98,8 @@ def _conclusion(first: Verdict, steps: list[Step]) -> str:
     if len(steps) == 1:
         return first.sentence
     start, end = steps[0].comparison, steps[-1].comparison
-    falls = ", ".join(
-        f"{name} from {start.error[name]:.3g} to {end.error[name]:.3g} (noise {end.sigma[j]:.2g})"
+    falls = ", of ".join(
+        f"{name} falls from {start.error[name]:.3g} to {end.error[name]:.3g} (noise {end.sigma[j]:.2g})"
         for j, name in enumerate(start.error)
     )
     last = steps[-1].verdict
@@ -107,4 +110,5 @@ def _conclusion(first: Verdict, steps: list[Step]) -> str:
         "missing_effect": "more is missing",
     }[last.verdict if last else "adequate"]
     rounds = len(steps) - 1
-    return f"{first.sentence} After {rounds} step{'s' if rounds > 1 else ''} the error falls for {falls}; {rest}."
+    added = "one step" if rounds == 1 else f"{rounds} steps"
+    return f"{headline(first)} In {added} the error of {falls}; {rest}."

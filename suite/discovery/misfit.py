@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +13,7 @@ from suite.discovery.engine import Point, Problem
 from suite.discovery.fit import homotopy, prepare
 from suite.discovery.noise import noise_variance
 from suite.discovery.result import Comparison, Discrepancy
-from suite.kernels.kalman import filtered
+from suite.kernels.kalman import Filtered, filtered
 from suite.kernels.smoother import smoothed
 from suite.model import Model
 from suite.record import Record, join
@@ -32,7 +33,8 @@ def frozen(model: Model) -> Model:
 
 def simulate(model: Model, record: Record, follow: float = 1.0) -> Array:
     """Free-run outputs (N, outputs) at the model's values; unknown initial states are fitted to the first part of
-    each run, of length `follow`."""
+    each run, of length `follow`.
+    """
     outputs = []
     for run in record.runs:
         lead = run if follow >= 1.0 else run.part(0, min(len(run), max(10, int(follow * len(run)))))
@@ -63,20 +65,20 @@ def compare(model: Model, record: Record, Y: Array | None = None, sigma: Array |
     spread = {name: float(np.nanstd(record.y[:, j])) for j, name in enumerate(names)}
     fit = {name: 100.0 * (1.0 - error[name] / spread[name]) if spread[name] > 0 else np.nan for name in names}
     worst = _worst(record, (record.y - Y) / sigma)
-    words = [f"The model explains {fit[name]:.3g} % of {name} (error {error[name]:.3g}, noise {sigma[j]:.2g})"
+    words = [f"{fit[name]:.3g} % of {name} (error {error[name]:.3g}, noise {sigma[j]:.2g})"
              for j, name in enumerate(names)]  # fmt: skip
     if worst:
         run, first, last = worst[0]
         which = f" of run {run + 1}" if len(record.starts) > 1 else ""
         words.append(f"the worst part is t = {first:.3g} to {last:.3g}{which}")
-    return Comparison(Y, sigma, error, fit, worst, "; ".join(words) + ".")
+    return Comparison(Y, sigma, error, fit, worst, f"The model explains {'; '.join(words)}.")
 
 
 def _worst(record: Record, e: Array) -> tuple[tuple[int, float, float], ...]:
     """The three worst of twenty equal parts of each run, where the mean square residual is far above the noise."""
     found = []
     bounds = record.bounds
-    for r, (first, last) in enumerate(zip(bounds[:-1], bounds[1:], strict=True)):
+    for r, (first, last) in enumerate(pairwise(bounds.tolist())):
         for part in np.array_split(np.arange(first, last), min(20, last - first)):
             there = e[part][np.isfinite(e[part])]
             level = float(np.mean(there**2)) if len(there) else 0.0
@@ -127,9 +129,9 @@ def discrepancy(problem: Problem, point: Point) -> Discrepancy:
     noise = float(np.mean(problem.run(point, 0.0).e ** 2)) if problem.count else 1.0
     free = problem.free_x0.astype(float)
 
-    def passes(level: float) -> list[tuple[Record, object]]:
+    def passes(level: float) -> list[tuple[Record, Filtered]]:
         Q = np.concatenate([np.zeros(n), level * pace**2 / step])
-        results = []
+        results: list[tuple[Record, Filtered]] = []
         for r, run in enumerate(problem.record.runs):
             x0 = np.concatenate([point.x0[r], np.zeros(extra)])
             reach = np.maximum(np.ptp(problem.path, axis=0), 1e-300)
@@ -140,16 +142,16 @@ def discrepancy(problem: Problem, point: Point) -> Discrepancy:
     best, chosen = -np.inf, None
     for level in 10.0 ** np.arange(-8.0, 1.5, 0.5):
         tried = passes(float(level))
-        if any(f.failed_at is not None for _, f in tried):  # type: ignore[attr-defined]
+        if any(f.failed_at is not None for _, f in tried):
             continue
-        likelihood = sum(f.log_likelihood for _, f in tried)  # type: ignore[attr-defined]
+        likelihood = sum(f.log_likelihood for _, f in tried)
         if likelihood > best:
             best, chosen = likelihood, tried
     N = len(problem.record)
     x, d, sd = np.zeros((N, n)), np.zeros((N, n)), np.zeros((N, n))
     at = 0
     for run, result in chosen or ():
-        smooth = smoothed(result)  # type: ignore[arg-type]
+        smooth = smoothed(result)
         rows = slice(at, at + len(run))
         at += len(run)
         x[rows] = smooth.x[:, :n]
@@ -187,9 +189,13 @@ def where(found: Discrepancy, record: Record, names: list[str]) -> str:
     which = np.clip(np.digitize(x, edges) - 1, 0, len(edges) - 2)
     bad = np.array([bool(out[which == b].mean() > 0.5) if (which == b).any() else False for b in range(len(edges) - 1)])
     if not bad.any():
-        return f"The model fails in {found.equation}' in {100 * share:.0f} % of the samples, at no one {found.variable}."
+        return (
+            f"The model fails in {found.equation}' in {100 * share:.0f} % of the samples, at no one {found.variable}."
+        )
     low, high = bad[: len(bad) // 2], bad[len(bad) // 2 :]
-    size = f"|{found.variable}|" if x.min() < 0 < x.max() and low.any() and high.any() and not bad[len(bad) // 2] else ""
+    size = (
+        f"|{found.variable}|" if x.min() < 0 < x.max() and low.any() and high.any() and not bad[len(bad) // 2] else ""
+    )
     if size:
         limit = min(abs(edges[1 + int(np.flatnonzero(low)[-1])]), abs(edges[len(low) + int(np.flatnonzero(high)[0])]))
         return f"The model fails in {found.equation}' for {size} > {limit:.2g}."
@@ -205,7 +211,8 @@ def where(found: Discrepancy, record: Record, names: list[str]) -> str:
 @dataclass(frozen=True)
 class Split:
     """What is fitted (`train`) and what is judged: the samples of `judged` from number `first`; its unknown first state
-    is fitted to the share `lead` of it."""
+    is fitted to the share `lead` of it.
+    """
 
     train: Record
     judged: Record

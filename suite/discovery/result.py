@@ -20,7 +20,8 @@ Kind = Literal["missing_effect", "adequate", "ambiguous", "unexplained"]
 class Comparison:
     """A model beside a record: the free-run simulation Y (N, outputs), the noise sd of each output, and in numbers
     by output the error (RMSE), the fit in percent of the output's variation; `worst` intervals (run, first, last time)
-    and a sentence that says where it fails."""
+    and a sentence that says where it fails.
+    """
 
     Y: Array
     sigma: Array
@@ -34,7 +35,8 @@ class Comparison:
 class Discrepancy:
     """The smoothed model error: x (N, n) smoothed states, d (N, n) in rate units with standard deviation d_sd (N, n),
     zero where an equation is a definition; `variable` the state against which it is best ordered, `equation` where it
-    is largest, `ratio` the correlation ratio (0..1) of d against that variable over bins."""
+    is largest, `ratio` the correlation ratio (0..1) of d against that variable over bins.
+    """
 
     x: Array
     d: Array
@@ -66,7 +68,8 @@ class Named:
 @dataclass(frozen=True)
 class Candidate:
     """A hypothesis that was refitted: its effects, its share of the weight, its criterion (EBIC, smaller is better),
-    its error by output, and delta^2: how far the best hypothesis' noise-free output is from anything it can produce."""
+    its error by output, and delta^2: how far the best hypothesis' noise-free output is from anything it can produce.
+    """
 
     effects: tuple[Named, ...]
     weight: float
@@ -131,7 +134,8 @@ class Verdict:
 @dataclass(frozen=True)
 class Step:
     """One round of the loop: the model as it stood, how it compared (on the fitted record and on held-out data), the
-    smoothed discrepancy, whiteness (autocorrelation of the residual by output, from lag 1), and the verdict."""
+    smoothed discrepancy, whiteness (autocorrelation of the residual by output, from lag 1), and the verdict.
+    """
 
     model: Model
     comparison: Comparison
@@ -143,7 +147,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Ledger:
-    """The whole loop on one record: the steps, the last of which is the final model, and the judgement in a sentence."""
+    """The whole loop on one record: the steps (the last has the final model) and the judgement in a sentence."""
 
     record: Record
     steps: tuple[Step, ...]

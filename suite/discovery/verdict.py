@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from suite.discovery import misfit, words
-from suite.discovery.engine import Point, Problem
-from suite.discovery.fit import Hypothesis, Level, covariance, fit, levenberg_marquardt, prepare, summarise
-from suite.discovery.identify import ALARM, Search, needs_more, score, search
-from suite.discovery.library import Term, candidates, grown
+from suite.discovery import misfit, separability, words
+from suite.discovery.engine import Problem
+from suite.discovery.fit import Hypothesis, Level, covariance, fit, prepare, summarise
+from suite.discovery.identify import ALARM, Search, needs_more, search
+from suite.discovery.library import candidates, grown
 from suite.discovery.result import Candidate, Coefficient, Kind, Named, Verdict
 from suite.effect import Effect
 from suite.model import Model, Parameter
@@ -24,8 +24,6 @@ Array = npt.NDArray[np.float64]
 
 SURE = 0.9  # weight from which a verdict names one effect
 PLAUSIBLE = 0.99  # weight that the stated set holds
-SEPARABLE = 16.0  # delta^2 below which data cannot tell two hypotheses apart
-SHOWN = 6  # rivals whose separation is computed
 REMAINS = 0.15  # of the error beyond the noise: what may remain for an effect to count as found, though not alone
 DECISIVE = 10.0  # of the criterion: what a further effect must gain where the residual does not become white
 NEAR = 2.5  # times the best one's remaining error: what a rival may leave where nothing explains all of it
@@ -60,7 +58,8 @@ def judge(found: Search) -> tuple[Verdict, Hypothesis]:
     ranked = sorted(zip(weights.tolist(), everything, values.tolist(), strict=True), key=lambda item: -item[0])
     kind = _kind(found, best, settled, ranked)
     named = best if kind in ("missing_effect", "ambiguous") else base
-    plausible = _plausible(found, ranked, named, settled) if kind != "adequate" else []
+    pairs = _plausible(found, ranked, named, settled) if kind != "adequate" else []
+    plausible = [candidate for _, candidate in pairs]
     count = len(problem.columns(()))
     correlations = misfit.whiteness(problem.record, _residual(problem, base.exact), names)
     error = _errors(found, named)
@@ -73,10 +72,14 @@ def judge(found: Search) -> tuple[Verdict, Hypothesis]:
             "lambda": float(base.gain), "threshold": ALARM,
             "ljung_box_p": misfit.ljung_box(correlations, problem.count // len(names), count),
         },
-        _smallest(found, named), error, _parameters(problem, named), 0.0,
+        separability.smallest_detectable(found, named), error, _parameters(problem, named), 0.0,
     )  # fmt: skip
-    advice = _advice(found, named, ranked, verdict) if kind == "ambiguous" else ()
-    verdict = replace(verdict, advice=advice, sentence=words.sentence(verdict, problem, settled))
+    said = (
+        separability.advice(found, named, [h for h, _ in pairs if h is not named], verdict)
+        if kind == "ambiguous"
+        else ()
+    )
+    verdict = replace(verdict, advice=said, sentence=words.sentence(verdict, problem, settled))
     return replace(verdict, seconds=found.seconds + time.perf_counter() - began), named
 
 
@@ -97,7 +100,8 @@ def _thrifty(found: Search, everything: Sequence[Hypothesis]) -> list[Hypothesis
 
 def _kind(found: Search, best: Hypothesis, settled: bool, ranked: Sequence[tuple[float, Hypothesis, float]]) -> Kind:
     """Adequate: the base model is best and nothing remains. Unexplained: something remains that the library barely
-    touches. Ambiguous: no hypothesis has the weight, or the best leaves part of the error."""
+    touches. Ambiguous: no hypothesis has the weight, or the best leaves part of the error.
+    """
     base = found.base
     if best is base:
         return "adequate" if settled else "unexplained"
@@ -203,99 +207,34 @@ def _errors(found: Search, named: Hypothesis) -> dict[str, Any]:
 
 def _plausible(
     found: Search, ranked: Sequence[tuple[float, Hypothesis, float]], best: Hypothesis, settled: bool
-) -> list[Candidate]:
+) -> list[tuple[Hypothesis, Candidate]]:
     """The hypotheses that hold 99 % of the weight, and any other that the data cannot tell from the best.
 
     Where the best leaves more than noise, weights cannot rule out what explains nearly as much: that is plausible too.
     """
     problem = found.problem
     names = list(problem.model.outputs)
-    chosen, held = [], 0.0
+    chosen: list[tuple[Hypothesis, Candidate]] = []
+    held = 0.0
     for place, (weight, hypothesis, value) in enumerate(ranked):
         if not hypothesis.active or not hypothesis.exact.passed.finite:
             held += weight
             continue
         separation = None
-        if hypothesis is not best and place <= SHOWN and best.active:
-            separation = distance(problem, best, hypothesis)
-        near = separation is not None and separation < SEPARABLE
+        if hypothesis is not best and place <= separability.SHOWN and best.active:
+            separation = separability.distance(problem, best, hypothesis)
+        near = separation is not None and separation < separability.SEPARABLE
         if not settled and len(hypothesis.active) <= len(best.active):
             near = near or _excess(problem, hypothesis.exact) <= NEAR * _excess(problem, best.exact)
         if held < PLAUSIBLE or near:
-            chosen.append(
-                Candidate(
-                    tuple(describe(problem, hypothesis)), weight, value,
-                    misfit.rmse(problem.record, hypothesis.exact.passed.Y, names), separation,
-                    curve(problem, found.base, hypothesis, problem.terms[hypothesis.active[0]].equation),
-                )  # fmt: skip
+            candidate = Candidate(
+                tuple(describe(problem, hypothesis)),
+                weight,
+                value,
+                misfit.rmse(problem.record, hypothesis.exact.passed.Y, names),
+                separation,
+                curve(problem, found.base, hypothesis, problem.terms[hypothesis.active[0]].equation),
             )
+            chosen.append((hypothesis, candidate))
         held += weight
     return chosen
-
-
-def distance(problem: Problem, winner: Hypothesis, rival: Hypothesis, known: Sequence[str] = ()) -> float:
-    """delta^2: the squared distance, in noise units, from the winner's noise-free output to what the rival can give.
-
-    `known` parameters stay at the winner's value: how much telling apart would gain from knowing them.
-    """
-    model = problem.model
-    count = len(model.parameters)
-    fixed = {name: replace(p, fixed=p.fixed or name in known) for name, p in model.parameters.items()}
-    Y = np.where(problem.seen, winner.exact.passed.Y, np.nan)
-    p = rival.exact.point.p.copy()
-    for j, name in enumerate(model.parameters):
-        if name in known:
-            p[j] = winner.exact.point.p[j]
-    start = Point(problem.start.x0, np.concatenate([winner.exact.point.p[:count], problem.start.p[count:]]))
-    scale = max(float(np.mean(winner.exact.passed.e**2)), 1e-12)
-    clean = replace(
-        problem, model=replace(model, parameters=fixed), record=replace(problem.record, y=Y), start=start, scale=scale
-    )
-    clean.__dict__["program"] = problem.program  # the same equations: nothing to compile again
-    level = levenberg_marquardt(clean, Point(rival.exact.point.x0, p), 0.0, rival.active, 25, 1e-3)
-    return float((level.passed.e**2).sum() / scale) if level.passed.finite else np.inf
-
-
-def _advice(
-    found: Search, best: Hypothesis, ranked: Sequence[tuple[float, Hypothesis, float]], verdict: Verdict
-) -> tuple[str, ...]:
-    """What would tell the best from its nearest rival: more data, or a parameter known better."""
-    problem = found.problem
-    rivals = [h for w, h, _ in ranked if h is not best and h.active and h.exact.passed.finite and w > 0.01]
-    if not rivals:
-        return ()
-    now = {id(h): distance(problem, best, h) for h in rivals[:SHOWN]}
-    rival = min(rivals[:SHOWN], key=lambda h: now[id(h)])
-    names = [[problem.terms[k].effect.id for k in h.active] for h in (best, rival)]
-    apart = now[id(rival)]
-    said = []
-    if apart < SEPARABLE:
-        times = f"about {SEPARABLE / apart:.2g} times the data" if apart > 0.1 else "no amount of the same data"
-        said.append(words.separate(names[0], names[1], apart, times))
-    gains = []
-    for name, parameter in problem.model.parameters.items():
-        if parameter.prior_sd > 0:
-            gains.append((distance(problem, best, rival, [name]), name))
-    if gains and max(gains)[0] > max(2.0 * apart, SEPARABLE / 2):
-        said.append(
-            f"Knowing {max(gains)[1]} exactly would raise the separation from {apart:.2g} to {max(gains)[0]:.2g} "
-            f"({SEPARABLE:g} is enough to tell)."
-        )
-    if best.gain > ALARM:
-        said.append(words.beside(verdict, [problem.terms[k].variable for k in best.active]))
-    return tuple(said)
-
-
-def _smallest(found: Search, named: Hypothesis) -> dict[str, float]:
-    """The smallest coefficient of each candidate that these data would show in 95 of 100 records."""
-    problem = found.problem
-    if not named.exact.passed.finite:
-        return {}
-    library = max(len(problem.terms) - len(found.absorbed), 2)
-    smallest = {}
-    for entry in score(problem, named, skip=found.absorbed, exact=True):
-        term: Term = problem.terms[entry.k]
-        penalty = len(term.names) * np.log(problem.count) + 2.0 * np.log(library)
-        if entry.length > 0:
-            smallest[f"{term.effect.id}@{term.equation}"] = float((np.sqrt(penalty) + 1.645) / entry.length)
-    return smallest

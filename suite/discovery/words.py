@@ -12,27 +12,49 @@ from suite.discovery.result import Named, Verdict
 
 
 def sentence(verdict: Verdict, problem: Problem, settled: bool) -> str:
-    """One to three sentences: what is missing, what it removes, what cannot be told."""
-    falls = _falls(verdict)
+    """The verdict in up to three sentences: what is missing, what it removes, what cannot be told."""
     match verdict.verdict:
         case "adequate":
-            moved = _moved(verdict)
-            return f"The model is adequate: the residual is white at the noise level{moved}, no effect is missing."
+            p = verdict.detection["ljung_box_p"]
+            white = (
+                "the residual is white"
+                if p >= 0.001
+                else "simulation is as good as any filter, though the residual is not white"
+            )
+            return f"The model is adequate{_moved(verdict)}: {white} (p = {p:.2g}) and no effect is missing."
         case "unexplained":
+            before, noise = _numbers(verdict.error["before"]), _numbers(verdict.error["noise"])
             return (
                 "The model fails, and nothing in the library explains it: "
-                f"the error stays at {_numbers(verdict.error['before'])} against a noise of {_numbers(verdict.error['noise'])}."
+                f"the error stays at {before} against a noise of {noise}."
             )
         case "missing_effect":
-            return f"Missing: {' and '.join(map(effect, verdict.effects))}, weight {weight(verdict.weight)}; {falls}."
-    rivals = [" with ".join(named.effect for named in c.effects) + f" ({weight(c.weight)})" for c in verdict.plausible]
+            return f"Missing: {_all(verdict)}, weight {weight(verdict.weight)}; {_falls(verdict)}."
     family = _family(verdict, problem)
     common = f" In each of them {family}." if family else ""
     rest = "" if settled else " Part of the error stays unexplained."
-    return (
-        f"An effect is missing and several fit: {', '.join(rivals)}.{common} "
-        f"With the first, {' and '.join(map(effect, verdict.effects))}, {falls}.{rest}"
-    )
+    return f"{_several(verdict)}{common} With the first, {_all(verdict)}, {_falls(verdict)}.{rest}"
+
+
+def headline(verdict: Verdict) -> str:
+    """The verdict without its numbers, for the top of a page."""
+    if verdict.verdict == "missing_effect":
+        names = " and ".join(f"{named.effect} in {named.equation}" for named in verdict.effects)
+        return f"Missing: {names} (weight {weight(verdict.weight)})."
+    if verdict.verdict == "ambiguous":
+        common = re.search(r"In each of them [^.]*\.", verdict.sentence)
+        return _several(verdict) + (f" {common.group()}" if common else "")
+    return verdict.sentence
+
+
+def _all(verdict: Verdict) -> str:
+    return " and ".join(map(effect, verdict.effects))
+
+
+def _several(verdict: Verdict) -> str:
+    rivals = [" with ".join(named.effect for named in c.effects) + f" ({weight(c.weight)})" for c in verdict.plausible]
+    more = f" and {len(rivals) - 5} more" if len(rivals) > 5 else ""
+    return f"An effect is missing; plausible: {', '.join(rivals[:5])}{more}."
 
 
 def effect(named: Named) -> str:
@@ -54,8 +76,8 @@ def value_sd(value: float, sd: float) -> str:
 def separate(best: Sequence[str], rival: Sequence[str], apart: float, times: str) -> str:
     """What it would take to tell two hypotheses apart."""
     return (
-        f"These data hardly tell {' with '.join(best)} from {' with '.join(rival)} (delta^2 = {apart:.2g}, 16 is enough); "
-        f"{times} would, or a larger amplitude."
+        f"These data hardly tell {' with '.join(best)} from {' with '.join(rival)} "
+        f"(delta^2 = {apart:.2g}, 16 is enough); {times} would, or a larger amplitude."
     )
 
 
@@ -66,8 +88,8 @@ def beside(verdict: Verdict, variables: Sequence[str]) -> str:
     if not others:
         return rest
     return (
-        f"{rest} Until it is found, {', '.join(others)} cannot be ruled out by weight alone; a record over another range "
-        f"of {' and '.join(dict.fromkeys(variables))} would separate them."
+        f"{rest} Until it is found, {', '.join(others)} cannot be ruled out by weight alone; "
+        f"a record over another range of {' and '.join(dict.fromkeys(variables))} would separate them."
     )
 
 
