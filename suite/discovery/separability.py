@@ -1,0 +1,80 @@
+"""Separability: what these data can tell apart, what would help, and the smallest effect they would have shown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from suite.discovery import words
+from suite.discovery.engine import Point, Problem
+from suite.discovery.fit import Hypothesis, levenberg_marquardt
+from suite.discovery.identify import ALARM, Search, score
+from suite.discovery.result import Verdict
+
+SEPARABLE = 16.0  # delta^2 below which data cannot tell two hypotheses apart
+SHOWN = 6  # rivals whose separation is computed
+
+
+def distance(problem: Problem, winner: Hypothesis, rival: Hypothesis, known: Sequence[str] = ()) -> float:
+    """delta^2: the squared distance, in noise units, from the winner's noise-free output to what the rival can give.
+
+    `known` parameters stay at the winner's value: how much telling apart would gain from knowing them.
+    """
+    model = problem.model
+    count = len(model.parameters)
+    fixed = {name: replace(p, fixed=p.fixed or name in known) for name, p in model.parameters.items()}
+    Y = np.where(problem.seen, winner.exact.passed.Y, np.nan)
+    p = rival.exact.point.p.copy()
+    for j, name in enumerate(model.parameters):
+        if name in known:
+            p[j] = winner.exact.point.p[j]
+    start = Point(problem.start.x0, np.concatenate([winner.exact.point.p[:count], problem.start.p[count:]]))
+    scale = max(float(np.mean(winner.exact.passed.e**2)), 1e-12)
+    clean = replace(
+        problem, model=replace(model, parameters=fixed), record=replace(problem.record, y=Y), start=start, scale=scale
+    )
+    clean.__dict__["program"] = problem.program  # the same equations: nothing to compile again
+    level = levenberg_marquardt(clean, Point(rival.exact.point.x0, p), 0.0, rival.active, 25, 1e-3)
+    return float((level.passed.e**2).sum() / scale) if level.passed.finite else np.inf
+
+
+def advice(found: Search, best: Hypothesis, rivals: Sequence[Hypothesis], verdict: Verdict) -> tuple[str, ...]:
+    """What would tell the best from its nearest plausible rival: more data, or a parameter known better."""
+    problem = found.problem
+    said = []
+    if rivals:
+        apart, rival = min(((distance(problem, best, h), h) for h in rivals[:SHOWN]), key=lambda pair: pair[0])
+        names = [[problem.terms[k].effect.id for k in h.active] for h in (best, rival)]
+        if apart < SEPARABLE:
+            times = f"about {SEPARABLE / apart:.2g} times the data" if apart > 0.1 else "no amount of the same data"
+            said.append(words.separate(names[0], names[1], apart, times))
+        gains = [
+            (distance(problem, best, rival, [name]), name)
+            for name, parameter in problem.model.parameters.items()
+            if parameter.prior_sd > 0
+        ]
+        if gains and apart < SEPARABLE and max(gains)[0] > max(2.0 * apart, SEPARABLE / 2):
+            said.append(
+                f"Knowing {max(gains)[1]} exactly would raise the separation from {apart:.2g} to {max(gains)[0]:.2g} "
+                f"({SEPARABLE:g} is enough to tell)."
+            )
+    if best.gain > ALARM:
+        said.append(words.beside(verdict, [problem.terms[k].variable for k in best.active]))
+    return tuple(said)
+
+
+def smallest_detectable(found: Search, named: Hypothesis) -> dict[str, float]:
+    """The smallest coefficient of each candidate that these data would show in 95 of 100 records."""
+    problem = found.problem
+    if not named.exact.passed.finite:
+        return {}
+    library = max(len(problem.terms) - len(found.absorbed), 2)
+    smallest = {}
+    for entry in score(problem, named, skip=found.absorbed, exact=True):
+        term = problem.terms[entry.k]
+        penalty = len(term.names) * np.log(problem.count) + 2.0 * np.log(library)
+        if entry.length > 0:
+            smallest[f"{term.effect.id}@{term.equation}"] = float((np.sqrt(penalty) + 1.645) / entry.length)
+    return smallest
