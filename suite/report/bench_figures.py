@@ -10,8 +10,10 @@ import matplotlib as mpl
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from suite.benchmark.statistics import score, summarise
 
@@ -20,6 +22,8 @@ Row = Mapping[str, Any]
 
 # Okabe and Ito (2008): told apart by all eyes.
 BLUE, ORANGE, GREEN, RED, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#666666"
+COLORS = (BLUE, ORANGE, GREEN, RED, "#CC79A7", "#56B4E9", "#000000")
+MARKERS = "osD^vP*X<>"
 STYLE: Any = {
     "font.size": 9,
     "axes.spines.top": False,
@@ -78,7 +82,7 @@ def _boxes(rows: Sequence[Row], case: str) -> Figure:
     """State error and model error of every estimator over seeds, a panel a noise level."""
     noises = sorted({row["noise"] for row in rows})
     order = _best_first(rows, "state_nrmse")[::-1]
-    figure = canvas(2.6 + 2.3 * len(noises), 1.2 + 2 * 0.19 * len(order) + 1.2)
+    figure = canvas(2.8 + 2.6 * len(noises), 2.4 + 2 * 0.17 * len(order))
     axes = figure.subplots(2, len(noises), sharey=True, sharex="row", squeeze=False)
     figure.suptitle(
         f"{case}: error of states (top) and of the model error (bottom), over seeds\n"
@@ -94,6 +98,7 @@ def _boxes(rows: Sequence[Row], case: str) -> Figure:
                 ]
                 _box(ax, k, [score(row, metric) for row in found], BLUE if variant == "tuned" else ORANGE)
             ax.set_xscale("log")
+            _decades(ax.xaxis)
             ax.grid(axis="x", color="0.9")
             ax.set_axisbelow(True)
             ax.set_xlabel(label)
@@ -103,6 +108,13 @@ def _boxes(rows: Sequence[Row], case: str) -> Figure:
             if i == 0:
                 ax.set_title(f"noise {100 * noise:g} %")
     return figure
+
+
+def _decades(axis: Axis) -> None:
+    """Ticks at 1, 2 and 5 of each decade, as plain numbers."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def _box(ax: Axes, at: int, values: Sequence[float], color: str) -> None:
@@ -124,14 +136,17 @@ def _matrix(rows: Sequence[Row]) -> Figure:
     grid = np.array(
         [[summary.get((*column, *name), {}).get("ratio", np.nan) for column in columns] for name in names], dtype=float
     )
-    figure = canvas(3.4 + 0.62 * len(columns), 2.2 + 0.24 * len(names))
+    figure = canvas(max(6.5, 3.4 + 0.62 * len(columns)), 2.2 + 0.24 * len(names))
     ax = figure.subplots()
     # Purple to orange through white: told apart by all eyes; equal steps of the ratio up and down.
     image = ax.imshow(np.log2(grid), cmap="PuOr_r", vmin=-3, vmax=3, aspect="auto")
     for i, j in np.ndindex(*grid.shape):
         value = grid[i, j]
-        dark = np.isfinite(value) and abs(np.log2(value)) > 1.9
-        text = "failed" if np.isnan(value) else f"{value:.2f}" if value < 100 else ">100"
+        dark = np.isfinite(value) and abs(np.log2(value)) > 1.3
+        text = f"{value:.2f}" if value < 100 else ">100"
+        if np.isnan(value):
+            line = summary.get((*columns[j], *names[i]))
+            text = "" if line is None else "failed" if line["ok"] == 0 else "no EKF"
         ax.text(j, i, text, ha="center", va="center", fontsize=6.5, color="white" if dark else "black")
     cases = [f"{case}, {100 * noise:g} %" for case, noise in columns]
     ax.set_xticks(range(len(columns)), cases, rotation=40, ha="right", fontsize=7)
@@ -148,7 +163,7 @@ def _pace(rows: Sequence[Row], case: str) -> Figure:
     noise = 0.05 if 0.05 in noises else noises[-1]
     lines = [s for s in summarise(rows, ("state_nrmse", "step_us")) if s["noise"] == noise]
     points = [s for s in lines if np.isfinite(s.get("state_nrmse", np.inf)) and np.isfinite(s.get("step_us", np.inf))]
-    figure = canvas(7.5, 4.6)
+    figure = canvas(8.5, 4.6)
     ax = figure.subplots()
     best = np.inf
     front = []
@@ -157,33 +172,20 @@ def _pace(rows: Sequence[Row], case: str) -> Figure:
             best = s["state_nrmse"]
             front.append(s)
     ax.step([s["step_us"] for s in front], [s["state_nrmse"] for s in front], where="post", color=GREY, lw=1, zorder=1)
-    for s in points:
-        tuned = s["variant"] == "tuned"
-        ax.plot(s["step_us"], s["state_nrmse"], "s" if tuned else "o", color=BLUE if tuned else ORANGE, ms=5, zorder=2)
-    _label(ax, points)
+    for k, name in enumerate(sorted({s["estimator"] for s in points})):
+        look = {"color": COLORS[k % len(COLORS)], "marker": MARKERS[k % len(MARKERS)], "ms": 6, "ls": "", "zorder": 2}
+        for s in (s for s in points if s["estimator"] == name):
+            face = look["color"] if s["variant"] == "tuned" else "none"
+            ax.plot(s["step_us"], s["state_nrmse"], markerfacecolor=face, **look)
+        ax.plot([], [], label=name, **look)
+    figure.legend(loc="outside right upper", fontsize=7.5, frameon=False)
     ax.set_xscale("log")
     ax.set_yscale("log")
+    _decades(ax.yaxis)
     ax.set_xlabel("run time a step [microseconds]")
     ax.set_ylabel("state error / sd, median")
     ax.set_title(
-        f"{case}, noise {100 * noise:g} %: accuracy against run time (circle: as shipped, square: tuned;\n"
-        "line: none is both faster and better)"
+        f"{case}, noise {100 * noise:g} %: accuracy against run time\n"
+        "(hollow: as shipped, filled: tuned; line: nothing is both faster and better)"
     )
     return figure
-
-
-def _label(ax: Axes, points: Sequence[Row]) -> None:
-    """Names at the points; those whose points nearly coincide share a label, so that none lies on another."""
-    groups: list[list[Row]] = []
-    for s in sorted(points, key=lambda s: (s["state_nrmse"], s["step_us"])):
-        for group in groups:
-            near = abs(np.log(s["state_nrmse"] / group[0]["state_nrmse"])) < 0.04
-            if near and abs(np.log(s["step_us"] / group[0]["step_us"])) < 1.2:
-                group.append(s)
-                break
-        else:
-            groups.append([s])
-    for group in groups:
-        right = max(group, key=lambda s: s["step_us"])
-        text = ", ".join(dict.fromkeys(s["estimator"] for s in group))
-        ax.annotate(text, (right["step_us"], right["state_nrmse"]), (6, -2), textcoords="offset points", fontsize=6.5)
