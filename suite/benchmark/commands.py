@@ -67,7 +67,9 @@ def _list(args: argparse.Namespace) -> int:
     for name in plan.shipped():
         print(f"{name:10s} {plan.load(name).sentence}")
     print(f"\n{args.plan}: {len(cells)} cells")
-    print("\n".join(cell.label for cell in cells))
+    # A whole plan in a line a case and estimator; what a pattern chose, cell by cell.
+    names = [cell.label if args.only else f"{cell.case} {cell.estimator}" for cell in cells]
+    print("\n".join(dict.fromkeys(names)))
     return 0
 
 

@@ -37,21 +37,18 @@ STYLE: Any = {
 def draw(rows: Sequence[Row], folder: Path) -> list[Path]:
     """Every figure of the matrix as SVG and PNG in `folder`; the paths written."""
     folder.mkdir(parents=True, exist_ok=True)
-    judged = [row for row in rows if row.get("status") != "skipped" and not row["case"].startswith(MEASURED)]
+    # A measured case has no truth, hence no error to show.
+    known = {row["case"] for row in rows if row.get("state_nrmse") is not None}
+    judged = [row for row in rows if row["status"] != "skipped" and row["case"] in known]
     paths: list[Path] = []
     with mpl.rc_context(STYLE):
         for case in dict.fromkeys(row["case"] for row in judged):
             mine = [row for row in judged if row["case"] == case]
-            if not any(row.get("state_nrmse") is not None for row in mine):
-                continue
             paths += save(_boxes(mine, case), folder / f"{case}-errors")
             paths += save(_pace(mine, case), folder / f"{case}-accuracy-against-time")
         if judged:
             paths += save(_matrix(judged), folder / "comparison-matrix")
     return paths
-
-
-MEASURED = ("cooling-", "whiffle-")
 
 
 def save(figure: Figure, stem: Path) -> list[Path]:
