@@ -1,8 +1,8 @@
 """The errors a user can cause; everything else is a defect of ours.
 
-    InputError             what was given cannot be used; the command line exits with 2
-      ModelError           a model file or a model built in Python
-      DataError            a record: a file, a column, a value
+- InputError: what was given cannot be used; the command line exits with 2
+- ModelError (an InputError): a model file or a model built in Python
+- DataError (an InputError): a record: a file, a column, a value
 """
 
 from __future__ import annotations

@@ -74,5 +74,7 @@ def _items(thing: Any) -> Iterator[Any]:
         if isinstance(value, (Case, Effect)):
             yield value
         elif inspect.isclass(value) and issubclass(value, Estimator) and not inspect.isabstract(value):
-            if not isinstance(thing, ModuleType) or value.__module__ == thing.__name__:
+            # A class that a module imports from another is that one's plug-in.
+            imported = isinstance(thing, ModuleType) and value.__module__ != thing.__name__
+            if not imported:
                 yield value()

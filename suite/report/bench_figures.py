@@ -170,7 +170,13 @@ def _pace(rows: Sequence[Row], case: str) -> Figure:
             front.append(s)
     ax.step([s["step_us"] for s in front], [s["state_nrmse"] for s in front], where="post", color=GREY, lw=1, zorder=1)
     for k, name in enumerate(sorted({s["estimator"] for s in points})):
-        look = {"color": COLORS[k % len(COLORS)], "marker": MARKERS[k % len(MARKERS)], "ms": 6, "ls": "", "zorder": 2}
+        look: dict[str, Any] = {
+            "color": COLORS[k % len(COLORS)],
+            "marker": MARKERS[k % len(MARKERS)],
+            "ms": 6,
+            "ls": "",
+            "zorder": 2,
+        }
         for s in (s for s in points if s["estimator"] == name):
             face = look["color"] if s["variant"] == "tuned" else "none"
             ax.plot(s["step_us"], s["state_nrmse"], markerfacecolor=face, **look)
