@@ -56,12 +56,11 @@ def effects() -> dict[str, Effect]:
 
 def _take(found: Found, label: str, load: Any) -> None:
     try:
-        items = list(_items(load()))
+        items = {item.id if isinstance(item, Effect) else item.name: item for item in _items(load())}
     except Exception as error:  # a plug-in may fail in any way; the others must still run
         found.failed[label] = f"{type(error).__name__}: {error}"
         return
-    for item in items:
-        name = item.id if isinstance(item, Effect) else item.name
+    for name, item in items.items():
         if name in found.loaded:
             found.failed[label] = f"the name {name!r} is already taken"
         else:

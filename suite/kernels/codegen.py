@@ -28,7 +28,7 @@ from sympy.printing.pycode import PythonCodePrinter
 from suite.expressions import symbol
 from suite.kernels import cache
 from suite.kernels.cache import numba
-from suite.kernels.types import MODEL_FUNCTION
+from suite.kernels.types import MODEL, MODEL_FUNCTION
 
 Array = npt.NDArray[np.float64]
 
@@ -59,11 +59,11 @@ class Program:
 
     @cached_property
     def rate(self) -> Any:
-        return _address(self.module.rate)
+        return _Address(self.module.rate)
 
     @cached_property
     def output(self) -> Any:
-        return _address(self.module.output)
+        return _Address(self.module.output)
 
     def all_off(self) -> npt.NDArray[np.int64]:
         """The gate switches, all off, (gates,)."""
@@ -83,9 +83,23 @@ class Program:
         return y, Hx, Hp
 
 
-def _address(function: Any) -> Any:
-    """The compiled function as its address: a kernel would look a dispatcher up anew at every call, for 1 ms."""
-    return CompileResultWAP(function.get_compile_result(MODEL_FUNCTION))
+class _Address:
+    """A compiled function as its address; a kernel would look a dispatcher up anew at every call, for 1 ms.
+
+    `_numba_type_` and `__wrapper_address__` are numba's protocols for objects with a known type and for functions.
+    """
+
+    _numba_type_ = MODEL
+
+    def __init__(self, function: Any) -> None:
+        self.function = function
+        self._address = CompileResultWAP(function.get_compile_result(MODEL_FUNCTION)).__wrapper_address__()
+
+    def __wrapper_address__(self) -> int:
+        return int(self._address)
+
+    def __call__(self, *arguments: Any) -> None:
+        self.function(*arguments)
 
 
 def _vector(values: Sequence[float] | Array) -> Array:
