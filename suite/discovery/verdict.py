@@ -55,6 +55,8 @@ def judge(found: Search) -> tuple[Verdict, Hypothesis]:
     best = everything[int(np.argmin(values))]
     weights = np.exp(-0.5 * (values - np.nanmin(values)))
     weights = np.where(np.isfinite(weights), weights, 0.0) / np.nansum(weights)
+    if not settled:
+        weights = weights * _told(best)
     ranked = sorted(zip(weights.tolist(), everything, values.tolist(), strict=True), key=lambda item: -item[0])
     kind = _kind(found, best, settled, ranked)
     named = best if kind in ("missing_effect", "ambiguous") else base
@@ -96,6 +98,14 @@ def _thrifty(found: Search, everything: Sequence[Hypothesis]) -> list[Hypothesis
         h for h in everything
         if not any(set(s.active) < set(h.active) and value(s) < value(h) + DECISIVE for s in everything)
     ]  # fmt: skip
+
+
+def _told(best: Hypothesis) -> float:
+    """The share of the best one's residual variance that is noise. The rest goes to what is not in the library: a
+    hypothesis that leaves a structure cannot be the whole truth, however far ahead of its rivals it is."""
+    if not best.exact.passed.finite:
+        return 0.0
+    return min(1.0, 1.0 / max(float(np.mean(best.exact.passed.e**2)), 1e-12))
 
 
 def _kind(found: Search, best: Hypothesis, settled: bool, ranked: Sequence[tuple[float, Hypothesis, float]]) -> Kind:
@@ -215,7 +225,7 @@ def _plausible(
     problem = found.problem
     names = list(problem.model.outputs)
     chosen: list[tuple[Hypothesis, Candidate]] = []
-    held = 0.0
+    held, total = 0.0, sum(weight for weight, _, _ in ranked)
     for place, (weight, hypothesis, value) in enumerate(ranked):
         if not hypothesis.active or not hypothesis.exact.passed.finite:
             held += weight
@@ -226,7 +236,7 @@ def _plausible(
         near = separation is not None and separation < separability.SEPARABLE
         if not settled and len(hypothesis.active) <= len(best.active):
             near = near or _excess(problem, hypothesis.exact) <= NEAR * _excess(problem, best.exact)
-        if held < PLAUSIBLE or near:
+        if held < PLAUSIBLE * total or near:
             candidate = Candidate(
                 tuple(describe(problem, hypothesis)),
                 weight,

@@ -54,7 +54,9 @@ def _all(verdict: Verdict) -> str:
 def _several(verdict: Verdict) -> str:
     rivals = [" with ".join(named.effect for named in c.effects) + f" ({weight(c.weight)})" for c in verdict.plausible]
     more = f" and {len(rivals) - 5} more" if len(rivals) > 5 else ""
-    return f"An effect is missing; plausible: {', '.join(rivals[:5])}{more}."
+    rest = 1.0 - sum(candidate.weight for candidate in verdict.plausible)
+    none = f"; or none of these ({weight(rest)})" if rest > 0.02 else ""
+    return f"An effect is missing; plausible: {', '.join(rivals[:5])}{more}{none}."
 
 
 def effect(named: Named) -> str:
