@@ -25,6 +25,7 @@ Array = npt.NDArray[np.float64]
 SURE = 0.9  # weight from which a verdict names one effect
 PLAUSIBLE = 0.99  # weight that the stated set holds
 REMAINS = 0.15  # of the error beyond the noise: what may remain for an effect to count as found, though not alone
+ODDS = 4.6  # of the criterion: an effect that no alarm calls for must be ten times likelier than none, 2 ln 10
 DECISIVE = 10.0  # of the criterion: what a further effect must gain where the residual does not become white
 NEAR = 2.5  # times the best one's remaining error: what a rival may leave where nothing explains all of it
 
@@ -115,6 +116,9 @@ def _kind(found: Search, best: Hypothesis, settled: bool, ranked: Sequence[tuple
     base = found.base
     if best is base:
         return "adequate" if settled else "unexplained"
+    if base.gain <= ALARM and found.criterion(base) - found.criterion(best) < ODDS:
+        # No alarm, and an effect only just pays for itself: what chance gives to one of many candidates.
+        return "adequate"
     if not settled:
         before, after = _excess(found.problem, base.exact), _excess(found.problem, best.exact)
         return "ambiguous" if after < REMAINS * before else "unexplained"
