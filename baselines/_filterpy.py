@@ -7,15 +7,18 @@ predict_x (linear as shipped); the normalised innovation squared is computed her
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from filterpy.kalman import ExtendedKalmanFilter, MerweScaledSigmaPoints, UnscentedKalmanFilter
 
-from suite.errors import DataError
+from suite.disturbance import spread_out, with_random_walk
+from suite.estimator import Estimate
+from suite.filtering import rates
 from suite.model import Model
+from suite.prior import prior_of
 from suite.record import Prior, Record
 
 Array = npt.NDArray[np.float64]
@@ -41,12 +44,16 @@ class Pass:
         """The mean normalised innovation squared; its expectation is the number of channels measured."""
         return float(np.nanmean(self.nis)) if np.any(np.isfinite(self.nis)) else 0.0
 
-    def ending(self, record: Record) -> tuple[str, str]:
-        """How the run ended: status and note of an Estimate."""
-        if self.failed_at is None:
-            return "ok", ""
-        when = f"the filter diverged at t = {record.t[self.failed_at]:.4g} s"
-        return "diverged", f"{when}; the last estimate is held from there"
+    def estimate(self, record: Record, x: Array, P: Array, d: Array, P_d: Array | None = None) -> Estimate:
+        """The pass as an Estimate, with how it ended."""
+        status, note = "ok", ""
+        if self.failed_at is not None:
+            status = "diverged"
+            note = f"the filter diverged at t = {record.t[self.failed_at]:.4g} s; the last estimate is held from there"
+        return Estimate(x=x, P=P, d=d, P_d=P_d, status=status, note=note, report={"mean NIS": self.mean_nis})
+
+
+Kind = Callable[[Model, Record, Prior], Pass]
 
 
 class _SteppedEKF(ExtendedKalmanFilter):  # type: ignore[misc]
@@ -107,13 +114,26 @@ def unscented(model: Model, record: Record, prior: Prior) -> Pass:
     return _run(ukf, model, record, predict, update)
 
 
-def prior_of(record: Record) -> Prior:
-    """The record's prior; raises DataError where there is none."""
-    if record.prior is None:
-        raise DataError(
-            f"{record.source}: the record has no prior; add one with record.with_prior(Prior(x0, P0, R, Q))"
-        )
-    return record.prior
+def alone(kind: Kind, model: Model, record: Record, q_scale: float) -> Estimate:
+    """A filter by itself, with process noise q_scale Q dt a step, Q the prior's density.
+
+    It has no model error of its own: d is the jump K nu of each sample as the rate that makes it within the step
+    that ends there, as in discrete invariant embedding, so that every row has a d.
+    """
+    prior = prior_of(record)
+    run = kind(model, record, replace(prior, Q=q_scale * prior.Q))
+    return run.estimate(record, run.x, run.P, rates(model, record, run.x, run.jump))
+
+
+def with_disturbance(kind: Kind, model: Model, record: Record, q_scale: float) -> Estimate:
+    """A filter with a disturbance state for each suspect: d and P_d are these states and their covariance.
+
+    `q_scale` multiplies the density of their walk (see `with_random_walk`).
+    """
+    grown, start = with_random_walk(model, record, prior_of(record), q_scale)
+    run = kind(grown, record, start)
+    n = len(model.states)
+    return run.estimate(record, run.x[:, :n], run.P[:, :n, :n], *spread_out(model, run.x, run.P))
 
 
 def _run(
@@ -121,7 +141,7 @@ def _run(
 ) -> Pass:
     N, n = len(record), len(model.states)
     x, P, jump, nis = np.zeros((N, n)), np.zeros((N, n, n)), np.zeros((N, n)), np.full(N, np.nan)
-    angle = np.array([output.angle for output in model.outputs.values()], dtype=bool)
+    angle = model.angles > 0
     for k in range(N):
         seen = ~np.isnan(record.y[k])
         try:

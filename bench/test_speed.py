@@ -9,7 +9,7 @@ import pytest
 
 from baselines._filterpy import extended
 from suite.case import Case, Experiment
-from suite.kernels.kalman import filtered
+from suite.filtering import filtered
 from suite.model import Initial, Model, Output, Parameter
 from suite.record import Prior, Record
 

@@ -2,24 +2,48 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, TypedDict
 
 import numpy as np
 import numpy.typing as npt
 
-from suite.errors import DataError
 from suite.estimator import Estimate
+from suite.filtering import held, rates
 from suite.kernels.embedding import continuous_embedding, discrete_embedding, embedding_workspace
 from suite.kernels.integrate import workspace
-from suite.kernels.jumps import rates
-from suite.kernels.kalman import angles, arrays, held
 from suite.kernels.matrix import flow_workspace
+from suite.kernels.types import arrays
 from suite.model import Model
+from suite.prior import prior_of
 from suite.record import Prior, Record
 
 Array = npt.NDArray[np.float64]
 Riccati = Literal["transition", "integration"]
 Residual = Literal["before", "after"]
+
+
+class Weights(TypedDict, total=False):
+    """What overrides the prior's: Q, the weight of J, (n,) or (n, n); R (outputs,); S0 (n, n), the first S.
+
+    Left out: density 1/(q_scale Q), the R of the sensors, P0/2.
+    """
+
+    Q: Array | None
+    R: Array | None
+    S0: Array | None
+
+
+class ContinuousOptions(Weights, total=False):
+    """Of a continuous filter, whose R is a spectral density: Riccati by transition matrix, or by integration."""
+
+    riccati: Riccati
+
+
+class DiscreteOptions(Weights, total=False):
+    """Of a discrete filter, whose R is the variance of a sample: dhat of the residual before or after the update."""
+
+    residual: Residual
+
 
 REASONS = {
     1: "the state estimate left every bound",
@@ -28,15 +52,6 @@ REASONS = {
 }
 # With less noise than this the gain settles within 1/STIFFEST of a sample, beyond what RK4 can follow in fair time.
 STIFFEST = 200.0
-
-
-def prior_of(record: Record) -> Prior:
-    """The record's prior; raises DataError where there is none."""
-    if record.prior is None:
-        raise DataError(
-            f"{record.source}: the record has no prior; add one with record.with_prior(Prior(x0, P0, R, Q))"
-        )
-    return record.prior
 
 
 def density(prior: Prior, q_scale: float, Q: Array | None) -> Array:
@@ -60,7 +75,7 @@ def cost(
     where a diverged estimate makes it overflow.
     """
     h = np.array([model.output(t, state, u) for t, state, u in zip(record.t, x, record.u, strict=True)])
-    wraps = angles(model) > 0
+    wraps = model.angles > 0
     counted = np.flatnonzero(np.diag(inverse) > 0)
     weight = np.linalg.inv(inverse[np.ix_(counted, counted)])
     length = record.t[-1] - record.t[0]
@@ -86,14 +101,14 @@ def between_samples(model: Model, record: Record, R: Array) -> Array:
     off = y[1:-1] - (1.0 - share) * y[:-2] - share * y[2:]
     counts = np.maximum(np.sum(~np.isnan(off), axis=0), 1)
     excess = np.maximum(np.nansum(off**2, axis=0) / counts - 1.5 * R, 0.0) * (8.0 / 15.0) / 16.0
-    return np.where(angles(model) > 0, 0.0, excess)
+    return np.where(model.angles > 0, 0.0, excess)
 
 
 def continuous(
-    model: Model, record: Record, alpha: float, q_scale: float, riccati: Riccati,
-    Q: Array | None, R: Array | None, S0: Array | None,
+    model: Model, record: Record, alpha: float, q_scale: float = 1.0, Q: Array | None = None, R: Array | None = None,
+    S0: Array | None = None, riccati: Riccati = "transition",
 ) -> Estimate:  # fmt: skip
-    """The continuous filter (47)-(55) over one run; R (outputs,) spectral density.
+    """The continuous filter (47)-(55) over one run; arguments as in `ContinuousOptions`.
 
     By default R is R_sample dt, R_sample with the error of the line between samples (`between_samples`): without it
     a gain that trusts z would follow the kinks of that line.
@@ -117,7 +132,7 @@ def continuous(
     start = prior.P0 / 2.0 if S0 is None else S0
     continuous_embedding(
         program.rate, program.output, *arrays(record.t, record.u), model.linear_inputs,
-        *arrays(record.y, prior.x0, start), model.values, program.all_off(), *arrays(W, Rk), angles(model),
+        *arrays(record.y, prior.x0, start), model.values, program.all_off(), *arrays(W, Rk), model.angles,
         int(riccati == "integration"), 4,
         embedding_workspace(n, program.inputs, program.parameters, program.outputs_count), flow_workspace(n),
         X, S, D, info,
@@ -126,10 +141,10 @@ def continuous(
 
 
 def discrete(
-    model: Model, record: Record, alpha: float, q_scale: float, residual: Residual,
-    Q: Array | None, R: Array | None, S0: Array | None,
+    model: Model, record: Record, alpha: float, q_scale: float = 1.0, Q: Array | None = None, R: Array | None = None,
+    S0: Array | None = None, residual: Residual = "before",
 ) -> Estimate:  # fmt: skip
-    """The discrete filter (63)-(74) over one run; R (outputs,) variance of a sample; dhat as a rate."""
+    """The discrete filter (63)-(74) over one run, dhat as a rate; arguments as in `DiscreteOptions`."""
     prior, program = prior_of(record), model.program
     inverse = density(prior, q_scale, Q)
     Rs = np.asarray(prior.R if R is None else R, dtype=np.float64)
@@ -139,7 +154,7 @@ def discrete(
     discrete_embedding(
         program.rate, program.output, *arrays(record.t, record.u), model.linear_inputs,
         *arrays(record.y, prior.x0, prior.P0 / 2.0 if S0 is None else S0), model.values, program.all_off(),
-        np.zeros(0, dtype=np.int64), *arrays(inverse / (2.0 * alpha), Rs), angles(model), int(residual == "after"),
+        np.zeros(0, dtype=np.int64), *arrays(inverse / (2.0 * alpha), Rs), model.angles, int(residual == "after"),
         workspace(n, program.inputs, program.parameters, 0), work, X, S, jumps, info,
     )  # fmt: skip
     D = rates(model, record, held(X, _failed(info)), held(jumps, _failed(info)))

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimators._invariant_embedding import cost, prior_of
+from estimators._invariant_embedding import cost
 from suite.disturbance import spread_out, with_random_walk
 from suite.estimator import Estimate, Estimator
-from suite.kernels.kalman import filtered, held
-from suite.kernels.smoother import smoothed
+from suite.filtering import filtered, held
 from suite.model import Model
+from suite.prior import prior_of
 from suite.record import Record
+from suite.smoothing import smoothed
 
 
 class RandomWalkSmoother(Estimator):

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
-import numpy.typing as npt
+from typing import Unpack
 
-from estimators._invariant_embedding import Residual, Riccati, continuous, discrete
+from estimators._invariant_embedding import ContinuousOptions, DiscreteOptions, continuous, discrete
 from suite.estimator import Estimate, Estimator
 from suite.model import Model
 from suite.record import Record
-
-Array = npt.NDArray[np.float64]
 
 
 class GeneralizedIE(Estimator):
@@ -32,12 +29,9 @@ class GeneralizedIE(Estimator):
         record: Record,
         alpha: float = 1.0,
         q_scale: float = 1.0,
-        riccati: Riccati = "transition",
-        Q: Array | None = None,
-        R: Array | None = None,
-        S0: Array | None = None,
+        **options: Unpack[ContinuousOptions],
     ) -> Estimate:
-        return continuous(model, record, alpha, q_scale, riccati, Q, R, S0)
+        return continuous(model, record, alpha, q_scale, **options)
 
 
 class GeneralizedIEDiscrete(Estimator):
@@ -53,14 +47,6 @@ class GeneralizedIEDiscrete(Estimator):
     tuning = {"alpha": (1e-4, 1e6, "log")}  # noqa: RUF012
 
     def estimate(  # type: ignore[override]
-        self,
-        model: Model,
-        record: Record,
-        alpha: float = 1.0,
-        q_scale: float = 1.0,
-        residual: Residual = "before",
-        Q: Array | None = None,
-        R: Array | None = None,
-        S0: Array | None = None,
+        self, model: Model, record: Record, alpha: float = 1.0, q_scale: float = 1.0, **options: Unpack[DiscreteOptions]
     ) -> Estimate:
-        return discrete(model, record, alpha, q_scale, residual, Q, R, S0)
+        return discrete(model, record, alpha, q_scale, **options)

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from estimators._invariant_embedding import cost, density, prior_of
+from estimators._invariant_embedding import cost, density
 from suite.estimator import Estimate, Estimator
-from suite.kernels.kalman import filtered, held
-from suite.kernels.smoother import smoothed
+from suite.filtering import filtered, held
 from suite.model import Model
+from suite.prior import prior_of
 from suite.record import Record
+from suite.smoothing import smoothed
 
 Array = npt.NDArray[np.float64]
 

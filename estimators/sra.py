@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Unpack
 
 import numpy as np
 import numpy.typing as npt
 
-from estimators._invariant_embedding import Residual, Riccati, continuous, density, discrete, prior_of
+from estimators._invariant_embedding import ContinuousOptions, DiscreteOptions, continuous, density, discrete
 from suite.estimator import Estimate, Estimator
 from suite.model import Model
+from suite.prior import prior_of
 from suite.record import Record
 
 Array = npt.NDArray[np.float64]
@@ -112,13 +114,10 @@ class SemiRobustAdaptive(Estimator):
         gamma: float | None = None,
         gamma_ratio: float = 2.0,
         q_scale: float = 1.0,
-        riccati: Riccati = "transition",
-        Q: Array | None = None,
-        R: Array | None = None,
-        S0: Array | None = None,
+        **options: Unpack[ContinuousOptions],
     ) -> Estimate:
-        gamma, found = _settings(model, record, gamma, gamma_ratio, q_scale, Q, R)
-        return _told(continuous(model, record, -(gamma**2), q_scale, riccati, Q, R, S0), record, gamma, found)
+        gamma, found = _settings(model, record, gamma, gamma_ratio, q_scale, options.get("Q"), options.get("R"))
+        return _told(continuous(model, record, -(gamma**2), q_scale, **options), record, gamma, found)
 
 
 class SemiRobustAdaptiveDiscrete(Estimator):
@@ -138,11 +137,9 @@ class SemiRobustAdaptiveDiscrete(Estimator):
         gamma: float | None = None,
         gamma_ratio: float = 2.0,
         q_scale: float = 1.0,
-        residual: Residual = "before",
-        Q: Array | None = None,
-        R: Array | None = None,
-        S0: Array | None = None,
+        **options: Unpack[DiscreteOptions],
     ) -> Estimate:
+        R = options.get("R")
         spectral = None if R is None else np.asarray(R, dtype=np.float64) * float(np.median(record.dt))
-        gamma, found = _settings(model, record, gamma, gamma_ratio, q_scale, Q, spectral)
-        return _told(discrete(model, record, -(gamma**2), q_scale, residual, Q, R, S0), record, gamma, found)
+        gamma, found = _settings(model, record, gamma, gamma_ratio, q_scale, options.get("Q"), spectral)
+        return _told(discrete(model, record, -(gamma**2), q_scale, **options), record, gamma, found)

@@ -142,6 +142,11 @@ class Model:
         """1 where an input runs on a line between samples, 0 where it is held, (inputs,)."""
         return np.array([float(entry.hold == "linear") for entry in self.inputs.values()])
 
+    @property
+    def angles(self) -> Array:
+        """1 where an output is an angle, whose residual wraps at +-pi, (outputs,)."""
+        return np.array([float(output.angle) for output in self.outputs.values()])
+
     @cached_property
     def program(self) -> codegen.Program:
         """The compiled rate and output functions with their derivatives."""

@@ -32,8 +32,10 @@ def find(kind: str) -> Found:
     """All plug-ins of a kind: "estimators" and "baselines" (instances), "cases", "effects"."""
     found = Found()
     package = importlib.import_module(kind)
-    for info in sorted(pkgutil.iter_modules(package.__path__), key=lambda info: info.name):
-        _take(found, f"{kind}.{info.name}", lambda name=f"{kind}.{info.name}": importlib.import_module(name))
+    for file in sorted(info.name for info in pkgutil.iter_modules(package.__path__)):
+        # What several plug-ins share has a name with _ and is none itself.
+        if not file.startswith("_"):
+            _take(found, f"{kind}.{file}", lambda name=f"{kind}.{file}": importlib.import_module(name))
     for point in sorted(entry_points(group=f"unmodelled.{kind}"), key=lambda point: point.name):
         _take(found, f"{point.value} (entry point {point.name})", point.load)
     return found

@@ -1,10 +1,11 @@
-"""The prior that every estimator of a benchmark cell starts from, made of the model and the record alone."""
+"""The prior that every estimator starts from: a record's own, or one made of the model and the record alone."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
 
+from suite.errors import DataError
 from suite.model import Model
 from suite.record import Prior, Record
 
@@ -38,3 +39,12 @@ def default_prior(model: Model, record: Record, noise: Array) -> Prior:
     pace = max(float(np.sqrt(np.nanmean((np.diff(first.y[:, j]) / first.dt) ** 2))) for j in range(first.y.shape[1]))
     Q = np.array([pace**2 * dt if name in model.suspects else 0.0 for name in model.states])
     return Prior(x0, np.diag(P0), R, Q)
+
+
+def prior_of(record: Record) -> Prior:
+    """The record's prior; raises DataError where there is none."""
+    if record.prior is None:
+        raise DataError(
+            f"{record.source}: the record has no prior; add one with record.with_prior(Prior(x0, P0, R, Q))"
+        )
+    return record.prior

@@ -11,8 +11,7 @@ from estimators.conventional_ie import ConventionalIE, ConventionalIEDiscrete
 from estimators.generalized_ie import GeneralizedIE, GeneralizedIEDiscrete
 from estimators.sra import SemiRobustAdaptive, SemiRobustAdaptiveDiscrete, threshold
 from suite.case import Case, Experiment
-from suite.kernels.jumps import rates
-from suite.kernels.kalman import filtered
+from suite.filtering import filtered, rates
 from suite.model import Initial, Model, Output, Parameter
 from suite.record import Prior, Record
 

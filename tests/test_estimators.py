@@ -12,7 +12,7 @@ from suite import plugins
 from suite.case import Case, Experiment
 from suite.errors import DataError
 from suite.estimator import Estimate, Estimator
-from suite.kernels.kalman import filtered
+from suite.filtering import filtered
 from suite.model import Initial, Input, Model, Output, Parameter
 from suite.record import Prior, Record
 

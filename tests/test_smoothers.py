@@ -9,10 +9,10 @@ from scipy.integrate import solve_bvp
 from estimators.disturbance_smoother import RandomWalkSmoother
 from estimators.minimum_model_error import MinimumModelError
 from suite.case import Case, Experiment
-from suite.kernels.kalman import filtered
-from suite.kernels.smoother import smoothed
+from suite.filtering import filtered
 from suite.model import Initial, Model, Output, Parameter
 from suite.record import Prior, Record
+from suite.smoothing import smoothed
 
 OSCILLATOR = Model(
     name="driven oscillator",

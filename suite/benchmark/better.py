@@ -24,7 +24,7 @@ from suite.benchmark.progress import Progress
 from suite.benchmark.table_one import TRUE_A3, measuring, regress
 from suite.case import Case
 from suite.estimator import Estimate
-from suite.kernels.kalman import filtered
+from suite.filtering import filtered
 from suite.model import Model, Parameter
 from suite.prior import default_prior
 from suite.record import Record

@@ -21,7 +21,7 @@ from suite.errors import DataError
 from suite.estimator import Estimator
 
 # Plug-ins share code through these packages; what they take from elsewhere is pinned by the version.
-OURS = ("estimators", "baselines", "suite.kernels")
+OURS = ("estimators", "baselines", "suite.kernels", "suite.filtering", "suite.smoothing")
 
 
 def _digest(*parts: Any) -> str:

@@ -13,10 +13,10 @@ from suite.discovery.engine import Point, Problem
 from suite.discovery.fit import homotopy, prepare
 from suite.discovery.noise import noise_variance
 from suite.discovery.result import Comparison, Discrepancy
-from suite.kernels.kalman import Filtered, filtered
-from suite.kernels.smoother import smoothed
+from suite.filtering import Filtered, filtered
 from suite.model import Model
 from suite.record import Record, join
+from suite.smoothing import smoothed
 
 Array = npt.NDArray[np.float64]
 

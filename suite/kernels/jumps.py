@@ -10,13 +10,17 @@ import numpy.typing as npt
 from suite.kernels import types as nb
 from suite.kernels.cache import compile_kernel
 from suite.kernels.matrix import exponential, solve
-from suite.model import Model
-from suite.record import Record
 
 Array = npt.NDArray[np.float64]
 
 # f (n,); Fx (n, n), Fp (n, parameters), G (n, n), d (n, 1); A, E, T1, T2 (2n, 2n)
 JUMP_WORK = nb.types.Tuple((nb.VECTOR,) + (nb.MATRIX,) * 8)
+
+
+def jump_workspace(n: int, parameters: int) -> tuple[Array, ...]:
+    """The scratch arrays of `rates_from_jumps`."""
+    own = (np.zeros(n), np.zeros((n, n)), np.zeros((n, parameters)), np.zeros((n, n)), np.zeros((n, 1)))
+    return (*own, *(np.zeros((2 * n, 2 * n)) for _ in range(4)))
 
 
 @compile_kernel(
@@ -52,20 +56,3 @@ def rates_from_jumps(rate: Any, t: Any, u: Any, p: Any, on: Any, X: Any, jumps: 
         singular = solve(G, d) == 0
         for i in range(n):
             D[k, i] = jumps[k, i] / dt if singular else d[i, 0]
-
-
-def rates(model: Model, record: Record, X: Array, jumps: Array) -> Array:
-    """The constant rates (N, n) that make the jumps (N, n) of a filter with states X (N, n) within its steps."""
-    program, D = model.program, np.zeros_like(X)
-    n = program.n
-    work = (
-        np.zeros(n),
-        np.zeros((n, n)),
-        np.zeros((n, program.parameters)),
-        np.zeros((n, n)),
-        np.zeros((n, 1)),
-        *(np.zeros((2 * n, 2 * n)) for _ in range(4)),
-    )
-    t, u, states, moved = (np.ascontiguousarray(a, dtype=np.float64) for a in (record.t, record.u, X, jumps))
-    rates_from_jumps(program.rate, t, u, model.values, program.all_off(), states, moved, work, D)
-    return D

@@ -7,7 +7,6 @@ inverse:  s = H P H' + R,  K = P H' / s,  x += K nu,  P -= K s K',  nu = y - h(x
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,14 +14,18 @@ import numpy.typing as npt
 
 from suite.kernels import types as nb
 from suite.kernels.cache import compile_kernel
-from suite.kernels.integrate import WORK, advance, workspace
-from suite.model import Model
-from suite.record import Record
+from suite.kernels.integrate import WORK, advance
 
 Array = npt.NDArray[np.float64]
 
 # Hp (outputs, parameters); x, base (n,); T, P, P2 (n, n)
 EKF_WORK = nb.types.Tuple((nb.MATRIX, nb.VECTOR, nb.VECTOR, nb.MATRIX, nb.MATRIX, nb.MATRIX, nb.VECTOR))
+
+
+def ekf_workspace(n: int, parameters: int, outputs: int) -> tuple[Array, ...]:
+    """The scratch arrays of `ekf`."""
+    squares = (np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n)))
+    return (np.zeros((outputs, parameters)), np.zeros(n), np.zeros(n), *squares, np.zeros(outputs))
 
 
 @compile_kernel(
@@ -134,82 +137,3 @@ def ekf(
         if not sound:
             return k
     return -1
-
-
-@dataclass(frozen=True)
-class Filtered:
-    """One pass over N samples of n states and m channels.
-
-    x, x_prior (N, n); P, P_prior (N, n, n); Phi, Qd (N, n, n): transition and process noise of the step that ends at
-    a sample; H, K (N, m, n); innovation, variance (N, m): of the channels one after another, 0 and 1 where missing;
-    failed_at: None, or the sample at which a number was no longer finite (later entries then mean nothing).
-    """
-
-    x: Array
-    P: Array
-    x_prior: Array
-    P_prior: Array
-    Phi: Array
-    Qd: Array
-    H: Array
-    K: Array
-    innovation: Array
-    variance: Array
-    failed_at: int | None = None
-
-    @property
-    def log_likelihood(self) -> float:
-        """Logarithm of the innovations' density, up to the constant of 2 pi."""
-        return -0.5 * float(np.sum(self.innovation**2 / self.variance + np.log(self.variance)))
-
-
-def filtered(
-    model: Model, record: Record, x0: Array, P0: Array, Q: Array, R: Array,
-    *, spread: bool = False, around: tuple[Array, Array] | None = None,
-) -> Filtered:  # fmt: skip
-    """The extended Kalman filter over one run, from x0, P0 at its first sample, which is used too.
-
-    Q (n,) or (n, n): density of the process noise; R (outputs,): variance of a sample; `spread`: the noise acts
-    through the step, not at its end; `around`, two (N, n): linearise the outputs and the
-    steps there (iterated smoother).
-    """
-    program, N = model.program, len(record)
-    n, m = program.n, program.outputs_count
-    density = np.diag(Q) if np.ndim(Q) == 1 else Q
-    X, Xp = np.zeros((N, n)), np.zeros((N, n))
-    P, Pp, Phi, Qd = (np.zeros((N, n, n)) for _ in range(4))
-    H, K = np.zeros((N, m, n)), np.zeros((N, m, n))
-    nu, s = np.zeros((N, m)), np.ones((N, m))
-    work = (
-        np.zeros((m, program.parameters)),
-        np.zeros(n),
-        np.zeros(n),
-        *(np.zeros((n, n)) for _ in range(3)),
-        np.zeros(m),
-    )
-    failed = ekf(
-        program.rate, program.output, *arrays(record.t, record.u), model.linear_inputs, *arrays(record.y),
-        *arrays(*(around or (X, X))), int(around is not None), *arrays(x0, P0), model.values,
-        program.all_off(), *arrays(density), int(spread), *arrays(R), angles(model), np.zeros(0, dtype=np.int64),
-        workspace(n, program.inputs, program.parameters, 0), work, X, P, Xp, Pp, Phi, Qd, H, K, nu, s,
-    )  # fmt: skip
-    return Filtered(X, P, Xp, Pp, Phi, Qd, H, K, nu, s, None if failed < 0 else int(failed))
-
-
-def arrays(*values: Any) -> tuple[Array, ...]:
-    """The values as a kernel wants them: contiguous numbers."""
-    return tuple(np.ascontiguousarray(value, dtype=np.float64) for value in values)
-
-
-def angles(model: Model) -> Array:
-    """1 where an output is an angle, whose residual wraps at +-pi, (outputs,)."""
-    return np.array([float(output.angle) for output in model.outputs.values()])
-
-
-def held(values: Array, failed_at: int | None) -> Array:
-    """The values with the last finite entry before `failed_at` in place of all that follows (zero if there is none)."""
-    if failed_at is None:
-        return values
-    kept = values.copy()
-    kept[failed_at:] = values[failed_at - 1] if failed_at > 0 else 0.0
-    return kept

@@ -10,7 +10,6 @@ problem (MATH 2 of the docs; Mook and Junkins 1988), so that d = (alpha Q)^-1 la
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,12 +17,16 @@ import numpy.typing as npt
 
 from suite.kernels import types as nb
 from suite.kernels.cache import compile_kernel
-from suite.kernels.kalman import Filtered
 
 Array = npt.NDArray[np.float64]
 
 # v (n,); A, B (n, n)
 SMOOTHER_WORK = nb.types.Tuple((nb.VECTOR, nb.VECTOR, nb.MATRIX, nb.MATRIX))
+
+
+def adjoint_workspace(n: int) -> tuple[Array, ...]:
+    """The scratch arrays of `adjoint`."""
+    return (np.zeros(n), np.zeros(n), np.zeros((n, n)), np.zeros((n, n)))
 
 
 @compile_kernel(
@@ -109,33 +112,3 @@ def adjoint(
             before[k, i] = v[i]
             for j in range(n):
                 Before[k, i, j] = 0.5 * (B[i, j] + B[j, i])
-
-
-@dataclass(frozen=True)
-class Smoothed:
-    """A smoothed run: x (N, n), P (N, n, n); w (N, n) the process noise of the step that ends at a sample, P_w its
-    covariance (zero at the first sample); before, after (N, n) the adjoint ahead of and behind each measurement, with
-    Before (N, n, n) the information ahead of it.
-    """
-
-    x: Array
-    P: Array
-    w: Array
-    P_w: Array
-    before: Array
-    Before: Array
-    after: Array
-
-
-def smoothed(run: Filtered) -> Smoothed:
-    """The fixed-interval smoother of a filter pass that did not fail."""
-    N, n = run.x.shape
-    Xs, before, after = (np.zeros((N, n)) for _ in range(3))
-    Ps, Before, After = (np.zeros((N, n, n)) for _ in range(3))
-    work = (np.zeros(n), np.zeros(n), np.zeros((n, n)), np.zeros((n, n)))
-    adjoint(
-        run.Phi, run.H, run.K, run.innovation, run.variance, run.x, run.P, work, Xs, Ps, before, Before, after, After
-    )  # fmt: skip
-    w = np.einsum("kij,kj->ki", run.Qd, before)
-    P_w = run.Qd - run.Qd @ Before @ run.Qd
-    return Smoothed(Xs, 0.5 * (Ps + Ps.transpose(0, 2, 1)), w, P_w, before, Before, after)

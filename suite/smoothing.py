@@ -1,0 +1,43 @@
+"""The fixed-interval smoother of a filter pass: states, and the noise that the steps must have had."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from suite.filtering import Filtered
+from suite.kernels.smoother import adjoint, adjoint_workspace
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Smoothed:
+    """A smoothed run: x (N, n), P (N, n, n); w (N, n) the process noise of the step that ends at a sample, P_w its
+    covariance (zero at the first sample); before, after (N, n) the adjoint ahead of and behind each measurement, with
+    Before (N, n, n) the information ahead of it.
+    """
+
+    x: Array
+    P: Array
+    w: Array
+    P_w: Array
+    before: Array
+    Before: Array
+    after: Array
+
+
+def smoothed(run: Filtered) -> Smoothed:
+    """The fixed-interval smoother of a filter pass that did not fail."""
+    N, n = run.x.shape
+    Xs, before, after = (np.zeros((N, n)) for _ in range(3))
+    Ps, Before, After = (np.zeros((N, n, n)) for _ in range(3))
+    work = adjoint_workspace(n)
+    adjoint(
+        run.Phi, run.H, run.K, run.innovation, run.variance, run.x, run.P, work, Xs, Ps, before, Before, after, After
+    )  # fmt: skip
+    w = np.einsum("kij,kj->ki", run.Qd, before)
+    P_w = run.Qd - run.Qd @ Before @ run.Qd
+    return Smoothed(Xs, 0.5 * (Ps + Ps.transpose(0, 2, 1)), w, P_w, before, Before, after)
