@@ -60,6 +60,7 @@ class Problem:
     weights: Array = field(default_factory=lambda: np.zeros(0))
     path: Array = field(default_factory=lambda: np.zeros((1, 0)))
     substeps: int = 1
+    frozen: bool = False  # fits move initial states only
     scale: float | None = None  # the noise's variance in units of R, where it is known and not profiled
 
     @cached_property
@@ -137,6 +138,8 @@ class Problem:
 
     def columns(self, active: Sequence[int]) -> Index:
         """Indices of the parameters that a fit with these candidates moves."""
+        if self.frozen:
+            return np.zeros(0, dtype=np.int64)
         base = len(self.model.parameters)
         sds = self.prior[1][:base]
         chosen = [j for j in range(base) if sds[j] > 0]

@@ -156,7 +156,8 @@ def covariance(problem: Problem, level: Level, columns: Index) -> Array:
     inverse = np.where(values > 1e-12, 1.0 / np.maximum(values, 1e-300), 1e12)
     # A parameter without any effect has a scale of zero: its variance is as large as numbers are.
     with np.errstate(over="ignore"):
-        return np.nan_to_num((vectors * inverse) @ vectors.T / np.outer(scale, scale), posinf=1e300, neginf=-1e300)
+        V = (vectors * inverse) @ vectors.T / np.outer(scale, scale)
+    return np.asarray(np.nan_to_num(V, posinf=1e300, neginf=-1e300))
 
 
 def prepare(model: Model, record: Record, terms: tuple[Term, ...] = ()) -> Problem:

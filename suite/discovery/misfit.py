@@ -233,9 +233,3 @@ def split(record: Record) -> Split | None:
         return None
     first = int((1 - HELD) * len(record))
     return Split(record.part(0, first), record, first / len(record), first)
-
-
-def held_out_error(model: Model, parts: Split) -> dict[str, float]:
-    """Free-run error of a fitted model on what was held out."""
-    Y = simulate(model, parts.judged, follow=parts.lead)
-    return rmse(parts.judged, Y, list(model.outputs), slice(parts.first, None))

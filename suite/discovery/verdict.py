@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from suite.discovery import misfit, separability, words
-from suite.discovery.engine import Problem
-from suite.discovery.fit import Hypothesis, Level, covariance, fit, prepare, summarise
+from suite.discovery.engine import Point, Problem
+from suite.discovery.fit import Hypothesis, Level, covariance, homotopy, prepare, summarise
 from suite.discovery.identify import ALARM, Search, needs_more, search
 from suite.discovery.library import candidates, grown
 from suite.discovery.result import Candidate, Coefficient, Kind, Named, Verdict
@@ -103,7 +103,8 @@ def _thrifty(found: Search, everything: Sequence[Hypothesis]) -> list[Hypothesis
 
 def _told(best: Hypothesis) -> float:
     """The share of the best one's residual variance that is noise. The rest goes to what is not in the library: a
-    hypothesis that leaves a structure cannot be the whole truth, however far ahead of its rivals it is."""
+    hypothesis that leaves a structure cannot be the whole truth, however far ahead of its rivals it is.
+    """
     if not best.exact.passed.finite:
         return 0.0
     return min(1.0, 1.0 / max(float(np.mean(best.exact.passed.e**2)), 1e-12))
@@ -213,10 +214,31 @@ def _errors(found: Search, named: Hypothesis) -> dict[str, Any]:
         return error
     held: dict[str, dict[str, float]] = {}
     for label, hypothesis in (("before", found.base), ("after", named)):
-        # The same structure, fitted again to the training part alone, from the file's values.
-        fitted = fit(amended(problem, hypothesis, fitted=False), parts.train)
-        held[label] = misfit.held_out_error(fitted.model, parts)
+        held[label] = held_out(problem, hypothesis, parts)
     return {**error, "held_out": held}
+
+
+def held_out(problem: Problem, hypothesis: Hypothesis, parts: misfit.Split) -> dict[str, float]:
+    """Free-run error on what is held out, of the same structure fitted to the training part alone.
+
+    The fit starts from the file's parameters and from the coefficients found; a run of its own then has its unknown
+    first state fitted, with all parameters fixed.
+    """
+    runs = len(parts.train.starts)
+    p = problem.start.p.copy()
+    for k in hypothesis.active:
+        p[problem.places(k)] = hypothesis.exact.point.p[problem.places(k)]
+    x0 = hypothesis.exact.point.x0[:runs]
+    train = replace(problem, record=parts.train, start=Point(x0, problem.start.p))
+    train.__dict__["program"] = problem.program  # the same equations: nothing to compile again
+    point = homotopy(train, Point(x0, p), hypothesis.active, first=0.1).exact.point
+    judged = replace(problem, record=parts.judged, frozen=True)
+    judged.__dict__["program"] = problem.program
+    if parts.first == 0:
+        start = Point(hypothesis.exact.point.x0[-1:], point.p)
+        point = homotopy(judged, start, hypothesis.active, first=0.1).exact.point if problem.free_x0.any() else start
+    Y = judged.run(point, 0.0, hypothesis.active).Y
+    return misfit.rmse(parts.judged, Y, list(problem.model.outputs), slice(parts.first, None))
 
 
 def _plausible(
