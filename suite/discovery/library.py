@@ -74,8 +74,9 @@ def candidates(model: Model, effects: Mapping[str, Effect], absolute: bool = Fal
     found: dict[tuple[str, sympy.Expr], Term] = {}
     for equation in model.suspects:
         own: list[Term] = []
+        level = _level(model, equation)
         for effect in effects.values():
-            own += _bind(model, effect, equation, names)
+            own += _bind(model, effect, equation, level, names)
         for term in sorted(own, key=lambda term: term.effect.generic):
             shape = expressions.parse(term.text, names.all | set(term.names), f"effect {term.effect.id}")
             if any(expressions.symbol(s) in shape.free_symbols for s in hidden):
@@ -107,7 +108,7 @@ class _Names:
         return f"{wanted}_{number}"
 
 
-def _bind(model: Model, effect: Effect, equation: str, names: _Names) -> Iterator[Term]:
+def _bind(model: Model, effect: Effect, equation: str, level: str | None, names: _Names) -> Iterator[Term]:
     """The effect with its role letters replaced by the states that play them in this equation."""
     position = next((p for p in model.definitions if model.states[p].strip() == equation), None)
     wanted = set(effect.roles.values())
@@ -116,7 +117,6 @@ def _bind(model: Model, effect: Effect, equation: str, names: _Names) -> Iterato
         return
     if "state" in wanted and mechanical:
         return
-    level = _level(model, equation)
     deviation = f"({equation} - {level})" if level else equation
     kelvin = _kelvin(model, equation, level)
     if wanted & {"temperature", "level"} and (kelvin is None or ("level" in wanted and level is None)):
@@ -164,7 +164,7 @@ def _level(model: Model, equation: str) -> str | None:
         return None
     for name in (*model.parameters, *model.inputs):
         level = expressions.symbol(name)
-        if level in rate.free_symbols and sympy.simplify(by_x + sympy.diff(rate, level)) == 0:
+        if level in rate.free_symbols and sympy.expand(by_x + sympy.diff(rate, level)) == 0:
             return name
     return None
 
