@@ -58,14 +58,9 @@ def _crosses(F: Array, G: Array, C: Array, gamma: float) -> bool:
 
 
 def _settings(
-    model: Model,
-    record: Record,
-    gamma: float | None,
-    gamma_ratio: float,
-    q_scale: float,
-    Q: Array | None,
-    R: Array | None,
-) -> tuple[float, float]:
+    model: Model, record: Record, gamma: float | None, gamma_ratio: float, q_scale: float,
+    Q: Array | None, R: Array | None,
+) -> tuple[float, float]:  # fmt: skip
     """Gamma and the bounded-real threshold at the first state; without a gamma, `gamma_ratio` thresholds."""
     prior = prior_of(record)
     inverse = density(prior, q_scale, Q)
@@ -108,14 +103,9 @@ class SemiRobustAdaptive(Estimator):
     tuning = {"gamma_ratio": (0.5, 1e4, "log")}  # noqa: RUF012
 
     def estimate(  # type: ignore[override]
-        self,
-        model: Model,
-        record: Record,
-        gamma: float | None = None,
-        gamma_ratio: float = 2.0,
-        q_scale: float = 1.0,
+        self, model: Model, record: Record, gamma: float | None = None, gamma_ratio: float = 2.0, q_scale: float = 1.0,
         **options: Unpack[ContinuousOptions],
-    ) -> Estimate:
+    ) -> Estimate:  # fmt: skip
         gamma, found = _settings(model, record, gamma, gamma_ratio, q_scale, options.get("Q"), options.get("R"))
         return _told(continuous(model, record, -(gamma**2), q_scale, **options), record, gamma, found)
 
@@ -131,14 +121,9 @@ class SemiRobustAdaptiveDiscrete(Estimator):
     tuning = {"gamma_ratio": (0.5, 1e4, "log")}  # noqa: RUF012
 
     def estimate(  # type: ignore[override]
-        self,
-        model: Model,
-        record: Record,
-        gamma: float | None = None,
-        gamma_ratio: float = 2.0,
-        q_scale: float = 1.0,
+        self, model: Model, record: Record, gamma: float | None = None, gamma_ratio: float = 2.0, q_scale: float = 1.0,
         **options: Unpack[DiscreteOptions],
-    ) -> Estimate:
+    ) -> Estimate:  # fmt: skip
         R = options.get("R")
         spectral = None if R is None else np.asarray(R, dtype=np.float64) * float(np.median(record.dt))
         gamma, found = _settings(model, record, gamma, gamma_ratio, q_scale, options.get("Q"), spectral)

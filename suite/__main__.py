@@ -9,8 +9,7 @@ import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
-from suite import __version__
-from suite.benchmark import commands as benchmark
+from suite import __version__, bench_verbs
 from suite.errors import InputError
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
@@ -65,7 +64,7 @@ def parser() -> argparse.ArgumentParser:
     verb.add_argument(
         "-o", "--output", type=Path, required=True, metavar="DIR", help="models, ledger, figures, report.html"
     )
-    benchmark.add_parser(verbs)
+    bench_verbs.add_parser(verbs)
     return top
 
 
@@ -75,7 +74,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     warnings.showwarning = _one_line
     try:
         if args.verb == "bench":
-            return benchmark.run(args)
+            return bench_verbs.run(args)
         from suite import verbs
 
         return int(getattr(verbs, args.verb.replace("list", "list_plugins"))(args))

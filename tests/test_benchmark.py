@@ -96,7 +96,7 @@ class Abstains(_Logged):
 
 DRIVER = """
 import argparse, sys
-from suite.benchmark.commands import add_parser, run
+from suite.bench_verbs import add_parser, run
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
@@ -321,7 +321,7 @@ def test_keys_follow_what_they_depend_on() -> None:
 def test_help_imports_nothing_heavy() -> None:
     """Building the command line of `bench` imports no numerics."""
     script = (
-        "import argparse, sys\nfrom suite.benchmark.commands import add_parser\n"
+        "import argparse, sys\nfrom suite.bench_verbs import add_parser\n"
         "add_parser(argparse.ArgumentParser().add_subparsers())\n"
         "print([m for m in ('numpy', 'scipy', 'numba', 'sympy', 'pandas', 'matplotlib') if m in sys.modules])"
     )

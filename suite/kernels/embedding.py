@@ -36,6 +36,11 @@ LOST = 1e100
 
 # x, xs, k, total, us, yv, f; Fp, Hp, Fx, Hx, B, S, half, end, L
 EMBEDDING_WORK = nb.types.Tuple((nb.VECTOR,) * 7 + (nb.MATRIX,) * 9)
+# What both filters are given, rate, output, t, u, linear, y, x0, S0, p, on, and what they write, X, S_out, D, info.
+GIVEN = (
+    nb.MODEL, nb.MODEL, nb.VECTOR, nb.MATRIX, nb.VECTOR, nb.MATRIX, nb.VECTOR, nb.MATRIX, nb.VECTOR, nb.INDICES,
+)  # fmt: skip
+WRITTEN = (nb.MATRIX, nb.CUBE, nb.MATRIX, nb.INDICES)
 
 
 def embedding_workspace(n: int, inputs: int, parameters: int, outputs: int) -> tuple[Array, ...]:
@@ -43,6 +48,16 @@ def embedding_workspace(n: int, inputs: int, parameters: int, outputs: int) -> t
     vectors = (np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(inputs), np.zeros(outputs), np.zeros(n))
     own = (np.zeros((n, parameters)), np.zeros((outputs, parameters)), np.zeros((n, n)), np.zeros((outputs, n)))
     return (*vectors, *own, *(np.zeros((n, n)) for _ in range(5)))
+
+
+@compile_kernel(nb.types.void(nb.VECTOR, nb.MATRIX, nb.VECTOR, nb.MATRIX, nb.INDICES))
+def begin(x0: Any, S0: Any, x: Any, S: Any, info: Any) -> None:
+    """Set x, S to their first values, and info to a run of which nothing bad is known. Writes x, S, info."""
+    info[0], info[1], info[2] = -1, 0, -1
+    for i in range(x0.shape[0]):
+        x[i] = x0[i]
+        for j in range(x0.shape[0]):
+            S[i, j] = S0[i, j]
 
 
 @compile_kernel(nb.REAL(nb.REAL, nb.REAL))
@@ -78,12 +93,8 @@ def correction(
 
 
 @compile_kernel(
-    nb.types.void(
-        nb.MODEL, nb.MODEL, nb.VECTOR, nb.MATRIX, nb.VECTOR, nb.MATRIX, nb.VECTOR, nb.MATRIX, nb.VECTOR, nb.INDICES,
-        nb.MATRIX, nb.MATRIX, nb.VECTOR, nb.INT, nb.INT, EMBEDDING_WORK, FLOW_WORK,
-        nb.MATRIX, nb.CUBE, nb.MATRIX, nb.INDICES,
-    )
-)  # fmt: skip
+    nb.types.void(*GIVEN, nb.MATRIX, nb.MATRIX, nb.VECTOR, nb.INT, nb.INT, EMBEDDING_WORK, FLOW_WORK, *WRITTEN)
+)
 def continuous_embedding(
     rate: Any, output: Any, t: Any, u: Any, linear: Any, y: Any, x0: Any, S0: Any, p: Any, on: Any,
     W: Any, R: Any, angle: Any, integration: int, substeps: int, work: Any, flow_work: Any,
@@ -99,11 +110,7 @@ def continuous_embedding(
     x, xs, slope, total, us, yv, f, Fp, Hp, Fx, Hx, B, S, half, end, L = work
     n = x0.shape[0]
     ny = y.shape[1]
-    info[0], info[1], info[2] = -1, 0, -1
-    for i in range(n):
-        x[i] = x0[i]
-        for j in range(n):
-            S[i, j] = S0[i, j]
+    begin(x0, S0, x, S, info)
     for k in range(t.shape[0]):
         done = 0.0
         parts = 0
@@ -178,12 +185,8 @@ def continuous_embedding(
 
 
 @compile_kernel(
-    nb.types.void(
-        nb.MODEL, nb.MODEL, nb.VECTOR, nb.MATRIX, nb.VECTOR, nb.MATRIX, nb.VECTOR, nb.MATRIX, nb.VECTOR, nb.INDICES,
-        nb.INDICES, nb.MATRIX, nb.VECTOR, nb.VECTOR, nb.INT, WORK, EMBEDDING_WORK,
-        nb.MATRIX, nb.CUBE, nb.MATRIX, nb.INDICES,
-    )
-)  # fmt: skip
+    nb.types.void(*GIVEN, nb.INDICES, nb.MATRIX, nb.VECTOR, nb.VECTOR, nb.INT, WORK, EMBEDDING_WORK, *WRITTEN)
+)
 def discrete_embedding(
     rate: Any, output: Any, t: Any, u: Any, linear: Any, y: Any, x0: Any, S0: Any, p: Any, on: Any,
     none: Any, W: Any, R: Any, angle: Any, after: int, advance_work: Any, work: Any,
@@ -197,11 +200,7 @@ def discrete_embedding(
     """
     x, _, prior, jump, _, yv, f, _, Hp, T, Hx, B, S, M, _, L = work
     n = x0.shape[0]
-    info[0], info[1], info[2] = -1, 0, -1
-    for i in range(n):
-        x[i] = x0[i]
-        for j in range(n):
-            S[i, j] = S0[i, j]
+    begin(x0, S0, x, S, info)
     for k in range(t.shape[0]):
         if k > 0:
             dt = t[k] - t[k - 1]

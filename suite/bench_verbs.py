@@ -146,8 +146,9 @@ def _claims(args: argparse.Namespace) -> int:
 
 
 def _table_one(args: argparse.Namespace) -> int:
-    from suite.benchmark import table, table_one_report
+    from suite.benchmark import table
+    from suite.report import table_one_page
 
-    made = table_one_report.write(args.output, args.seeds)
+    made = table_one_page.write(args.output, args.seeds)
     print(table.to_json(made) if args.json else made["text"])
     return 0
