@@ -25,6 +25,19 @@ def test_every_case_loads() -> None:
     assert len(plugins.cases()) >= len(FILES)
 
 
+def test_a_private_file_is_no_plug_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file whose name starts with _ is not even imported."""
+    text = "from suite import plugins\nEFFECT = plugins.effects()['cubic_stiffness']\n"
+    folder = tmp_path / "a_folder_of_plug_ins"
+    folder.mkdir()
+    (folder / "__init__.py").touch()
+    (folder / "one.py").write_text(text, encoding="utf-8")
+    (folder / "_shared.py").write_text("raise ImportError('private')\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    found = plugins.find(folder.name)
+    assert (list(found.loaded), found.failed) == (["cubic_stiffness"], {})
+
+
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_a_case_is_at_most_40_lines(path: Path) -> None:
     """A case fits on one screen."""
