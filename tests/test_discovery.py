@@ -17,6 +17,7 @@ from suite.discovery.library import candidates
 from suite.discovery.loop import discover
 from suite.discovery.noise import noise_variance
 from suite.discovery.verdict import diagnose, investigate, judge
+from suite.errors import DataError
 from suite.model import Initial, Model, Output, Parameter
 from suite.record import Record
 
@@ -202,3 +203,19 @@ def test_the_cooling_mug_loses_more_than_in_proportion() -> None:
     assert len(verdict.effects) == 1
     assert "grows faster than proportionally" in verdict.sentence
     assert verdict.advice
+
+
+def test_drag_is_found_on_a_falling_whiffle_ball() -> None:
+    """Measured: a resistance that grows with speed; on the other drop the error falls from 2.6 m to below 0.3 m."""
+    case = plugins.cases()["whiffle-ball"]
+    assert case.measured is not None
+    try:
+        record = case.measured(None)
+    except DataError as error:
+        pytest.skip(str(error))
+    verdict = diagnose(case.deficient, record, EFFECTS)
+    assert verdict.verdict == "ambiguous"
+    assert verdict.effects[0].effect in ("viscous_damping", "quadratic_drag")
+    assert {"viscous_damping", "quadratic_drag"} <= {c.effects[0].effect for c in verdict.plausible}
+    assert verdict.error["held_out"]["before"]["z"] == pytest.approx(2.6, abs=0.1)
+    assert verdict.error["held_out"]["after"]["z"] < 0.3
