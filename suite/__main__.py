@@ -72,6 +72,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; returns its exit code."""
     args = parser().parse_args(argv)
     warnings.showwarning = _one_line
+    # What numerics meet on the way (an overflow in a trial step) is no news; its outcome is.
+    warnings.simplefilter("ignore", RuntimeWarning)
     try:
         if args.verb == "bench":
             return bench_verbs.run(args)

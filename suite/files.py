@@ -22,8 +22,20 @@ def write_whole(path: str | os.PathLike[str], text: str) -> None:
             os.umask(mask)
             os.chmod(handle.name, 0o666 & ~mask)
             os.replace(handle.name, file)
-        except OSError:
+        except BaseException:
             os.unlink(handle.name)
             raise
     except OSError as error:
         raise InputError(f"{file}: cannot be written ({error.strerror}); choose another place") from None
+
+
+def writable_folder(path: Path) -> None:
+    """Make the folder, and see that it can be written."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=path):
+            pass
+    except FileExistsError:
+        raise InputError(f"{path}: is a file, not a folder; choose another place") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror}); choose another place") from None

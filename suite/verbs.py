@@ -23,7 +23,7 @@ from suite.discovery.verdict import diagnose as verdict_on
 from suite.discovery.words import effect as effect_words
 from suite.discovery.words import value_sd, weight
 from suite.errors import InputError
-from suite.files import write_whole
+from suite.files import writable_folder, write_whole
 from suite.model import Model, Parameter
 from suite.model_file import read_model, to_toml, write_model
 from suite.readers import read_record
@@ -45,13 +45,15 @@ def example(args: argparse.Namespace) -> int:
     if case.truth is not None:
         if not math.isfinite(args.noise) or args.noise < 0:
             raise InputError(f"--noise: expected a fraction from 0, got {args.noise}; write --noise 0.05")
+        if args.seed < 0:
+            raise InputError(f"--seed: expected a whole number from 0, got {args.seed}; write --seed 1")
         record = case.simulate(args.noise, args.seed)[0]
         known = {n: replace(p, sd=KNOWN_TO * abs(p.value)) if not p.fixed else p for n, p in model.parameters.items()}
         model = replace(model, parameters=known)
     else:
         assert case.measured is not None
         record = case.measured(args.source)
-    args.folder.mkdir(parents=True, exist_ok=True)
+    writable_folder(args.folder)
     written = [args.folder / "model.toml"]
     write_model(replace(model, time=model.time or "t"), written[0])
     for number, run in enumerate(record.runs):
@@ -237,9 +239,10 @@ def discover(args: argparse.Namespace) -> int:
 
     model, record = _read(args)
     effects = plugins.effects()
-    ledger = loop(model, record, effects, args.absolute, lambda text: print(text, file=sys.stderr))
+    # A folder that cannot be written is refused before minutes are spent.
     folder: Path = args.output
-    folder.mkdir(parents=True, exist_ok=True)
+    writable_folder(folder)
+    ledger = loop(model, record, effects, args.absolute, lambda text: print(text, file=sys.stderr))
     for number, step in enumerate(ledger.steps):
         write_model(step.model, folder / f"step{number}.toml")
     write_model(ledger.steps[-1].model, folder / "model.toml")

@@ -9,9 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from suite.discovery.engine import Problem
-from suite.discovery.fit import covariance, homotopy, prepare
+from suite.discovery.fit import Hypothesis, covariance, homotopy, levenberg_marquardt, prepare
+from suite.discovery.identify import ALARM
 from suite.discovery.noise import noise_variance
-from suite.model import Model
+from suite.model import Hold, Model
 from suite.record import Record
 
 Array = npt.NDArray[np.float64]
@@ -39,6 +40,8 @@ def check(model: Model, record: Record) -> Checkup:
     problem = prepare(model, record)
     level = homotopy(problem, problem.start)
     facts["undetermined"] = _undetermined(problem, level.exact if np.isfinite(level.exact.L) else level.best, findings)
+    if model.inputs:
+        _holds(problem, level, findings)
     facts["input_delay"] = _delays(problem, level.exact.point, findings) if model.inputs else {}
     return Checkup(facts, tuple(findings))
 
@@ -57,12 +60,15 @@ def _steps(record: Record, findings: list[str]) -> dict[str, float]:
 def _outputs(model: Model, record: Record, findings: list[str]) -> dict[str, Any]:
     facts = {}
     sigma = np.sqrt(noise_variance(model, record))
+    unknown = replace(model, outputs={name: replace(output, sigma=None) for name, output in model.outputs.items()})
     for j, (name, output) in enumerate(model.outputs.items()):
         y = record.y[:, j]
         there = ~np.isnan(y)
         span = float(np.ptp(y[there]))
-        jumps = np.abs(np.diff(y[there]) - np.median(np.diff(y[there])))
-        typical = max(1.4826 * float(np.median(jumps)), 1e-300)
+        if span == 0.0:
+            findings.append(f"{name} never changes; nothing can be learned from it.")
+        changes = np.diff(y[there]) if there.sum() > 1 else np.zeros(1)
+        typical = max(1.4826 * float(np.median(np.abs(changes - np.median(changes)))), 1e-300)
         outliers = int(_spikes(y[there], max(float(sigma[j]), 0.2 * typical)).sum())
         levels = len(np.unique(y[there]))
         facts[name] = {
@@ -77,6 +83,19 @@ def _outputs(model: Model, record: Record, findings: list[str]) -> dict[str, Any
             findings.append(f"{name} is mostly noise: {sigma[j]:.3g} against a range of {span:.3g}.")
         if there.sum() > 50 and levels < 20:
             findings.append(f"{name} takes only {levels} values; it may be quantised or saturated.")
+        estimated = float(np.sqrt(noise_variance(unknown, record)[j]))
+        if output.sigma is not None and there.sum() > 50 and not 1 / 3 < output.sigma / max(estimated, 1e-300) < 3:
+            findings.append(
+                f"{name} has sigma = {output.sigma:.3g} in the model file, but its samples scatter by {estimated:.3g}."
+            )
+        state = output.equation.strip()
+        known = {s: start.value for s, start in model.initial.items() if not (start.estimate or output.angle)}
+        for run in record.runs if state in known else ():
+            if abs(run.y[0, j] - known[state]) > OUTLIER * max(float(sigma[j]), 0.01 * span):
+                findings.append(
+                    f"{state} starts at {known[state]:.4g} in the model file, but {name} at {run.y[0, j]:.4g} in "
+                    f"{run.source}; correct it, or write estimate = true."
+                )
         for edge, word in ((np.nanmax(y), "highest"), (np.nanmin(y), "lowest")):
             stuck = int((y == edge).sum())
             if stuck > max(5, 0.02 * len(y)) and levels > 20:
@@ -137,6 +156,20 @@ def _undetermined(problem: Problem, level: Any, findings: list[str]) -> dict[str
         if value and sd > 0.5 * value and problem.names[j] not in dead:
             findings.append(f"{problem.names[j]} is known to {100 * sd / value:.0f} % only after these data.")
     return {"directions": directions, "sd": dict(zip([problem.names[j] for j in columns], sds.tolist(), strict=True))}
+
+
+def _holds(problem: Problem, level: Hypothesis, findings: list[str]) -> None:
+    """Whether an input that is held otherwise between the samples fits better."""
+    model = problem.model
+    for name, entry in model.inputs.items():
+        other: Hold = "linear" if entry.hold == "previous" else "previous"
+        inputs = {**model.inputs, name: replace(entry, hold=other)}
+        changed = replace(problem, model=replace(model, inputs=inputs))
+        L = levenberg_marquardt(changed, level.exact.point, 0.0, (), 30, 1e-3).L
+        if L < level.exact.L - ALARM:
+            findings.append(
+                f'Input {name} fits better with hold = "{other}"; a wrong hold looks like a missing effect.'
+            )
 
 
 def _delays(problem: Problem, point: Any, findings: list[str]) -> dict[str, int]:

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from suite.discovery.library import Term, gates
+from suite.discovery.noise import QUIETEST, spans
 from suite.errors import DataError
 from suite.kernels import codegen
 from suite.kernels.integrate import workspace
@@ -23,8 +24,6 @@ from suite.record import Record
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
-
-SMALLEST = 1e-12  # of the mean squared error: noise-free data must not drive the criterion to minus infinity
 
 
 @dataclass(frozen=True)
@@ -177,9 +176,18 @@ class Problem:
             workspace(n, program.inputs, program.parameters, m), scratch, e, s, J, X, Y,
         )  # fmt: skip
         seen = self.seen
-        logs = float(np.log(s[seen]).sum())
+        with np.errstate(invalid="ignore", divide="ignore"):
+            logs = float(np.log(s[seen]).sum())
         finite = failed < 0 and bool(np.isfinite(e).all())
-        return Pass(e[seen], self._scatter(J), logs, Y, X, finite)
+        return Pass(e[seen], self._scatter(J), logs, self._turned(Y), X, finite)
+
+    def _turned(self, Y: Array) -> Array:
+        """Simulated angles in the turn of their measurement."""
+        for j in np.flatnonzero(self.angles):
+            rows = self.seen[:, j] & np.isfinite(Y[:, j])
+            turns = np.round((self.record.y[rows, j] - Y[rows, j]) / (2.0 * np.pi))
+            Y[rows, j] += 2.0 * np.pi * turns
+        return Y
 
     @cached_property
     def angles(self) -> Array:
@@ -215,7 +223,15 @@ class Problem:
 
     def noise(self, passed: Pass) -> float:
         """The noise's variance in units of R: given, or the mean squared error."""
-        return self.scale if self.scale is not None else max(float(np.mean(passed.e**2)), SMALLEST)
+        return self.scale if self.scale is not None else max(float(np.mean(passed.e**2)), self.quietest)
+
+    @cached_property
+    def quietest(self) -> float:
+        """The noise's variance in units of R below which the integrator makes the error: noise-free data must not
+        drive the criterion to minus infinity.
+        """
+        floor = float(np.min((QUIETEST * spans(self.record)) ** 2 / self.R))
+        return min(max(floor, 1e-12), 1.0)
 
     def pack(self, point: Point, columns: Index) -> Array:
         """Theta of a point."""
@@ -243,8 +259,11 @@ def check_record(model: Model, record: Record) -> None:
             f"got {record.y.shape[1]} and {record.u.shape[1]}; read it with this model"
         )
     unknown = sum(p.prior_sd > 0 for p in model.parameters.values())
-    if int((~np.isnan(record.y)).sum()) <= unknown + len(model.states):
+    open_states = [s for s in model.states if s not in model.initial or model.initial[s].estimate]
+    first = len(open_states) * len(record.starts)
+    count = int((~np.isnan(record.y)).sum())
+    if count < unknown + first + 2:
         raise DataError(
-            f"{record.source}: {int((~np.isnan(record.y)).sum())} measurements cannot determine {unknown} parameters "
-            f"and {len(model.states)} initial states; add data or fix parameters"
+            f"{record.source}: {count} measurements cannot determine {unknown} parameters and {first} initial states; "
+            "add data or fix parameters"
         )

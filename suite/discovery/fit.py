@@ -16,12 +16,14 @@ import numpy.typing as npt
 
 from suite.discovery.engine import Index, Pass, Point, Problem, check_record
 from suite.discovery.library import Term
-from suite.discovery.noise import noise_variance
+from suite.discovery.noise import noise_variance, unrolled
 from suite.model import Model
 from suite.record import Record
 
 Array = npt.NDArray[np.float64]
 
+EXACT = 0.01  # of the noise: what finer integration may still move
+FINEST = 16  # integration steps a sample that are tried; half of them are used
 LEVELS = (10.0, 1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 0.0)
 
 
@@ -175,9 +177,21 @@ def prepare(model: Model, record: Record, terms: tuple[Term, ...] = ()) -> Probl
             path = level.passed.X
             x0 = level.point.x0
     problem = replace(problem, path=path, weights=_pace(model, record, path), start=Point(x0, model.values))
-    full = replace(problem, terms=terms)
+    full = replace(problem, substeps=_substeps(problem), terms=terms)
     p = np.concatenate([model.values, *(_start(full, term) for term in terms)])
     return replace(full, start=Point(x0, p))
+
+
+def _substeps(problem: Problem) -> int:
+    """Integration steps a sample: doubled while that moves the outputs by more than EXACT of the noise; one where the
+    movement does not shrink in the end as a step's error does (a chaotic plant).
+    """
+    before, moved, last, count = np.inf, np.inf, problem.run(problem.start, 0.0), 1
+    while last.finite and moved > EXACT and count < FINEST:
+        finer = replace(problem, substeps=2 * count).run(problem.start, 0.0)
+        before, moved = moved, float(np.max(np.abs(finer.Y - last.Y) / problem.R**0.5)) if finer.finite else np.inf
+        last, count = finer, 2 * count
+    return 1 if moved > 0.25 * before or not np.isfinite(moved) else max(count // 2, 1)
 
 
 def _start(problem: Problem, term: Term) -> Array:
@@ -200,12 +214,16 @@ def _first_states(model: Model, record: Record) -> tuple[Array, npt.NDArray[np.b
             continue
         position = next((p for p in model.definitions if model.states[p].strip() == name), None)
         for r, run in enumerate(record.runs):
+            own = measured.get(name, measured.get(position or ""))
+            if own is None:
+                continue
+            y = unrolled(run, own, list(model.outputs.values())[own].angle)
+            there = ~np.isnan(y)
+            t, y = run.t[there][:6], y[there][:6]
             if name in measured:
-                x0[r, i] = run.y[:, measured[name]][~np.isnan(run.y[:, measured[name]])][0]
-            elif position in measured:
-                there = ~np.isnan(run.y[:, measured[position]])
-                t, y = run.t[there][:6], run.y[there, measured[position]][:6]
-                x0[r, i] = np.polyfit(t - t[0], y, 1)[0] if len(t) > 1 else 0.0
+                x0[r, i] = y[0] if len(y) else 0.0
+            elif len(y) > 1:
+                x0[r, i] = np.polyfit(t - t[0], y, 1)[0]
     return x0, free
 
 
@@ -216,7 +234,7 @@ def _rough_path(problem: Problem) -> Array:
     for i, name in enumerate(model.states):
         for j, output in enumerate(model.outputs.values()):
             if output.equation.strip() == name:
-                path[:, i] = record.y[:, j]
+                path[:, i] = np.concatenate([unrolled(run, j, output.angle) for run in record.runs])
     for i, name in enumerate(model.states):
         position = next((p for p in model.definitions if model.states[p].strip() == name), None)
         if position is not None and not np.isfinite(path[:, i]).all():

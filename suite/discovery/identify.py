@@ -16,6 +16,8 @@ import numpy.typing as npt
 from suite.discovery.engine import Index, Pass, Point, Problem
 from suite.discovery.fit import LEVELS, Hypothesis, Level, homotopy, polish
 from suite.discovery.library import Term
+from suite.discovery.noise import spans
+from suite.errors import DataError
 
 Array = npt.NDArray[np.float64]
 
@@ -61,7 +63,13 @@ class Search:
         library = len(self.problem.terms) - len(self.absorbed)
         extra = 2.0 * len(terms) * np.log(max(library, 2))
         tones = sum(2.0 * np.log(self.frequencies) for term in terms if _is_tone(term))
-        return float(L + count * np.log(self.problem.count) + extra + tones)
+        return float(L + count * np.log(self.problem.count) + extra + tones + _few(self.problem.count, hypothesis))
+
+
+def _few(samples: int, hypothesis: Hypothesis) -> float:
+    """What a short record adds to the price of parameters, 2 k (k + 1) / (n - k - 1): Hurvich and Tsai (1989)."""
+    k = hypothesis.exact.passed.J.shape[1]
+    return 2.0 * k * (k + 1) / (samples - k - 1) if samples > k + 1 else np.inf
 
 
 def _is_tone(term: Term) -> bool:
@@ -69,7 +77,15 @@ def _is_tone(term: Term) -> bool:
 
 
 def search(problem: Problem) -> Search:
-    """Fit the base model, score, refit, and add second effects while something remains to be explained."""
+    """Fit the base model, score, refit, and add second effects while something remains to be explained.
+
+    Raises DataError where no output ever changes.
+    """
+    if not spans(problem.record).any():
+        names = ", ".join(problem.model.outputs)
+        raise DataError(
+            f"{problem.record.source}: {names} never changes, so nothing can be learned; measure while the plant moves"
+        )
     base = polish(problem, homotopy(problem, problem.start))
     frequencies = _frequencies(problem)
     absorbed = _absorbed(problem, base)
@@ -85,7 +101,12 @@ def search(problem: Problem) -> Search:
 
 def needs_more(found: Search, best: Hypothesis) -> bool:
     """Whether something remains after the best hypothesis: a process noise is still worth having."""
-    return not np.isfinite(best.exact.L) or best.gain > ALARM
+    if not np.isfinite(best.exact.L) or best.gain > ALARM:
+        return True
+    # Where no equation may be wrong there is no process noise to be worth having: the error itself tells.
+    problem, e = found.problem, best.exact.passed.e
+    excess = float((e**2).sum()) - len(e)
+    return not problem.weights.any() and excess > ALARM * np.sqrt(2.0 * len(e))
 
 
 def score(problem: Problem, hypothesis: Hypothesis, skip: Iterable[int] = (), exact: bool = False) -> list[Score]:
@@ -93,6 +114,8 @@ def score(problem: Problem, hypothesis: Hypothesis, skip: Iterable[int] = (), ex
     left_out = {*skip, *hypothesis.active}
     best: dict[int, Score] = {}
     levels = [level for level in hypothesis.levels if np.isfinite(level.L)]
+    if not levels:
+        return []
     at = min(range(len(levels)), key=lambda i: levels[i].L)
     for level in [levels[-1]] if exact else levels[max(at - 1, 0) : at + 2]:
         for entry in _scores_at(problem, hypothesis, level, left_out):
@@ -144,7 +167,7 @@ def _score_pass(
     if not passed.finite:
         return
     width = passed.J.shape[1] - (len(columns) - len(own))
-    r, B, _ = _projected(problem, passed, own, width)
+    r, B, C = _projected(problem, passed, own, width)
     noise = problem.noise(passed)
     at = 0
     for k in chosen:
@@ -152,8 +175,8 @@ def _score_pass(
         b = B[:, at : at + count]
         at += count
         gram = b.T @ b
-        norms = np.diag(gram)
-        if not np.isfinite(gram).all() or (norms <= 1e-20 * max(float(noise), 1e-300)).any():
+        norms, whole = np.diag(gram), (C[:, at - count : at] ** 2).sum(axis=0)
+        if not np.isfinite(gram).all() or (norms <= 1e-16 * whole).any():
             continue
         scale = np.sqrt(norms)
         c = -np.linalg.lstsq(gram / np.outer(scale, scale), b.T @ r / scale, rcond=1e-10)[0] / scale

@@ -22,12 +22,12 @@ def noise_variance(model: Model, record: Record) -> Array:
     """
     variances = []
     for j, output in enumerate(model.outputs.values()):
-        span = float(np.nanmax(record.y[:, j]) - np.nanmin(record.y[:, j]))
+        span = float(spans(record)[j])
         floor = (QUIETEST * (span or 1.0)) ** 2
         if output.sigma is not None:
             variances.append(max(output.sigma**2, floor))
             continue
-        squares = np.concatenate([_innovation(run.t, run.y[:, j]) for run in record.runs])
+        squares = np.concatenate([_innovation(run.t, unrolled(run, j, output.angle)) for run in record.runs])
         if len(squares) == 0:
             variances.append(max((0.01 * span) ** 2, floor))
             continue
@@ -36,6 +36,20 @@ def noise_variance(model: Model, record: Record) -> Array:
         clipped = float(np.minimum(squares, 9.0 * robust).mean()) / 0.9935 if robust > 0 else float(squares.mean())
         variances.append(max(clipped, floor))
     return np.array(variances)
+
+
+def spans(record: Record) -> Array:
+    """Range of each output, (outputs,); 0 where it is constant or missing throughout."""
+    return np.array([float(np.ptp(y[~np.isnan(y)])) if (~np.isnan(y)).any() else 0.0 for y in record.y.T])
+
+
+def unrolled(run: Record, j: int, angle: bool) -> Array:
+    """Output j of one run, (N,), without the jumps of a wrapped angle."""
+    y = run.y[:, j].copy()
+    if angle:
+        there = ~np.isnan(y)
+        y[there] = np.unwrap(y[there])
+    return y
 
 
 def _innovation(t: Array, y: Array) -> Array:
