@@ -155,7 +155,7 @@ def autocorrelation(model: Model, record: Record, correlation: Mapping[str, Arra
 def change(steps: tuple[Step, ...], at: int) -> str:
     """What step `at` did to the model of the step before, in a few words."""
     if at == 0:
-        return "as given"
+        return "as given, refitted"
     before, now = steps[at - 1], steps[at]
     if str(before.model) == str(now.model):
         return "refitted"

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Mapping
 from datetime import date as calendar
 from pathlib import Path
@@ -17,6 +15,7 @@ from matplotlib.figure import Figure
 from suite import __version__
 from suite.discovery.result import Candidate, Ledger, Step, Verdict
 from suite.effect import Effect
+from suite.files import write_whole
 from suite.model import Model
 from suite.report import failure, figures
 from suite.report.canvas import BAND99, MOST
@@ -46,7 +45,7 @@ def write_report(
     `command` is the line that repeats the run, `sentence` the judgement (the ledger's if empty), `effects` the library
     by id, from which each effect takes its sentence of physics, `date` the day it was made (today if empty).
     """
-    _replace(Path(path), _page(ledger, command, sentence, effects or {}, date))
+    write_whole(path, _page(ledger, command, sentence, effects or {}, date))
     return Path(path)
 
 
@@ -59,24 +58,9 @@ def write_figures(ledger: Ledger, folder: Path) -> list[Path]:
         drawn |= {f"step{k}-{name}": fig for name, fig in _drawn(ledger, step, MOST).items()}
     written = []
     for name, fig in drawn.items():
-        _replace(folder / f"{name}.svg", svg(fig, name))
+        write_whole(folder / f"{name}.svg", svg(fig, name))
         written.append(folder / f"{name}.svg")
     return written
-
-
-def _replace(path: Path, text: str) -> None:
-    """Write beside the file and move over it, so that no reader ever sees half a file."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-        # mkstemp makes files that only their owner reads.
-        Path(temporary).chmod(0o644)
-        Path(temporary).replace(path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
 
 
 def _drawn(ledger: Ledger, step: Step, most: int) -> dict[str, Figure]:
@@ -135,6 +119,8 @@ def _page(ledger: Ledger, command: str, sentence: str, effects: Mapping[str, Eff
     return environment.get_template("report.html.j2").render(
         model=ledger.steps[-1].model.name,
         sentence=sentence or ledger.sentence,
+        # A short judgement on top leaves the rest of the ledger's for the line below.
+        lead=ledger.sentence.removeprefix(sentence).strip() if sentence else "",
         keys=_keys(ledger),
         letters=Markup(letters),
         figures={name: Markup(text) for name, text in shared.items()},
