@@ -21,7 +21,7 @@ from suite.discovery.loop import discover as loop
 from suite.discovery.result import Verdict
 from suite.discovery.verdict import diagnose as verdict_on
 from suite.discovery.words import effect as effect_words
-from suite.discovery.words import value_sd, weight
+from suite.discovery.words import headline, value_sd, weight
 from suite.errors import InputError
 from suite.files import writable_folder, write_whole
 from suite.model import Model, Parameter
@@ -253,9 +253,9 @@ def discover(args: argparse.Namespace) -> int:
     given = " ".join(shlex.quote(str(path)) for path in [args.model, *args.data, "-o", folder])
     command = f"unmodelled discover {given}"
     write_figures(ledger, folder / "figures")
-    write_report(ledger, folder / "report.html", command, ledger.sentence, effects)
     first = ledger.steps[0].verdict
     assert first is not None
+    write_report(ledger, folder / "report.html", command, headline(first), effects)
     if args.json:
         return _json(first.to_json())
     print(ledger.sentence)
