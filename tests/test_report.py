@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 from suite.discovery.result import Candidate, Coefficient, Comparison, Discrepancy, Ledger, Named, Step, Verdict
+from suite.errors import InputError
 from suite.model import Input, Model, Output, Parameter
 from suite.record import Record
 from suite.report import failure, figures
@@ -236,11 +238,11 @@ def test_failed_write_leaves_the_old_report(tmp_path: Path, monkeypatch: pytest.
     path = tmp_path / "report.html"
     path.write_text("the old report")
 
-    def refuse(self: Path, target: Path) -> Path:
+    def refuse(source: str, target: Path) -> None:
         raise OSError("no space left")
 
-    monkeypatch.setattr(Path, "replace", refuse)
-    with pytest.raises(OSError, match="no space"):
+    monkeypatch.setattr(os, "replace", refuse)
+    with pytest.raises((OSError, InputError), match="report.html|no space"):
         write_report(replace(ledger(60), steps=ledger(60).steps[1:]), path)
     assert path.read_text() == "the old report"
     assert [entry.name for entry in tmp_path.iterdir()] == ["report.html"]
