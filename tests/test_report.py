@@ -242,7 +242,7 @@ def test_failed_write_leaves_the_old_report(tmp_path: Path, monkeypatch: pytest.
         raise OSError("no space left")
 
     monkeypatch.setattr(os, "replace", refuse)
-    with pytest.raises((OSError, InputError), match="report.html|no space"):
+    with pytest.raises((OSError, InputError), match=r"report\.html|no space"):
         write_report(replace(ledger(60), steps=ledger(60).steps[1:]), path)
     assert path.read_text() == "the old report"
     assert [entry.name for entry in tmp_path.iterdir()] == ["report.html"]

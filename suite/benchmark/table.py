@@ -119,13 +119,7 @@ def write(rows: Sequence[Row], path: Path) -> None:
         frame.to_csv(path, index=False)
     elif path.suffix == ".parquet":
         # A column that is a number here and a word there (a report's) is written as text.
-        mixed = [name for name in frame if frame[name].map(type).nunique() > 2]
-        worded = dict.fromkeys({*mixed, *_worded(frame)}, str)
-        frame.astype(worded).to_parquet(path, index=False)
+        words = [name for name in frame if frame[name].map(lambda value: isinstance(value, str)).any()]
+        frame.astype(dict.fromkeys(words, str)).to_parquet(path, index=False)
     else:
         raise InputError(f"{path}: a table is written as .csv, .parquet or .json; change the ending")
-
-
-def _worded(frame: pd.DataFrame) -> list[str]:
-    """Columns that hold words beside numbers (a threshold, or "infinite"); parquet has one type a column."""
-    return [c for c in frame.columns if frame[c].dtype == object and any(isinstance(v, str) for v in frame[c])]
