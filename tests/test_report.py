@@ -239,10 +239,10 @@ def test_failed_write_leaves_the_old_report(tmp_path: Path, monkeypatch: pytest.
     path.write_text("the old report")
 
     def refuse(source: str, target: Path) -> None:
-        raise OSError("no space left")
+        raise OSError(28, "no space left")
 
     monkeypatch.setattr(os, "replace", refuse)
-    with pytest.raises((OSError, InputError), match=r"report\.html|no space"):
+    with pytest.raises(InputError, match="no space left"):
         write_report(replace(ledger(60), steps=ledger(60).steps[1:]), path)
     assert path.read_text() == "the old report"
     assert [entry.name for entry in tmp_path.iterdir()] == ["report.html"]
