@@ -48,13 +48,24 @@ class Truth:
 
 
 @dataclass(frozen=True)
+class Held:
+    """A measured record that is judged and never fitted: its unknown first state is fitted to its first `lead` samples
+    (None: to all of them), with all parameters fixed, and the error of the free run counts from sample `first` on.
+    """
+
+    record: Record
+    lead: int | None = None
+    first: int = 0
+
+
+@dataclass(frozen=True)
 class Case:
     """A plant whose model lacks something (or nothing: a null case).
 
     Simulated: `truth` and `experiment` are given; noise is a fraction of each output's standard deviation;
     `held` freezes the model error over each sample (the sampled plant of discrete-time methods).
-    Measured: `measured` reads the runs, raising DataError with the way to get them where they are not there; `truth`
-    is None.
+    Measured: `measured` reads the runs that are fitted, raising DataError with the way to get them where they are not
+    there; `held_out` those that are judged, by name; `truth` is None.
     """
 
     name: str
@@ -66,6 +77,7 @@ class Case:
     missing: tuple[Missing, ...] = ()
     noises: tuple[float, ...] = (0.0, 0.01, 0.05, 0.1)
     held: bool = False
+    held_out: Callable[[Path | None], Mapping[str, Held]] | None = None
 
     def simulate(self, noise: float, seed: int) -> tuple[Record, Truth]:
         """The record of one experiment and its truth; `noise` is the fraction, `seed` fixes every random number."""
