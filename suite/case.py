@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from suite.kernels.integrate import workspace
-from suite.kernels.trajectory import trajectory
+from suite.kernels.trajectory import plant_workspace, trajectory
 from suite.model import Model, Parameter
 from suite.record import Record
 
@@ -19,7 +18,7 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Missing:
-    """A removed effect: its id, the equation it acted in, and its coefficients."""
+    """A removed effect: its id, the equation it acted in (a state, an output or an input) and its coefficients."""
 
     effect: str
     equation: str
@@ -28,12 +27,16 @@ class Missing:
 
 @dataclass(frozen=True)
 class Experiment:
-    """How the plant is run: seconds, sampling step, first state and the inputs as functions of time."""
+    """How the plant is run: seconds, sampling step, the true plant's first state and the inputs as functions of time.
+
+    `every` names outputs that are seen only at each k-th sample, from sample k on; NaN between.
+    """
 
     duration: float
     dt: float
     x0: tuple[float, ...]
     inputs: Mapping[str, Callable[[float], float]] = field(default_factory=dict)
+    every: Mapping[str, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -63,9 +66,11 @@ class Case:
     """A plant whose model lacks something (or nothing: a null case).
 
     Simulated: `truth` and `experiment` are given; noise is a fraction of each output's standard deviation;
-    `held` freezes the model error over each sample (the sampled plant of discrete-time methods).
+    `held` freezes the model error over each sample (the sampled plant of discrete-time methods). The truth has every
+    state of the deficient model, by name, and may have more; its outputs and inputs are the deficient model's.
     Measured: `measured` reads the runs that are fitted, raising DataError with the way to get them where they are not
     there; `held_out` those that are judged, by name; `truth` is None.
+    `tags` sort the cases: "mechanical", "thermal", "published", "null" (nothing is missing), "large" ...
     """
 
     name: str
@@ -78,6 +83,7 @@ class Case:
     noises: tuple[float, ...] = (0.0, 0.01, 0.05, 0.1)
     held: bool = False
     held_out: Callable[[Path | None], Mapping[str, Held]] | None = None
+    tags: tuple[str, ...] = ()
 
     def simulate(self, noise: float, seed: int) -> tuple[Record, Truth]:
         """The record of one experiment and its truth; `noise` is the fraction, `seed` fixes every random number."""
@@ -91,22 +97,36 @@ class Case:
         clean = np.array([self.truth.output(t[k], x[k], u[k]) for k in range(len(t))])
         spread = noise * clean.std(axis=0)
         y = clean + spread * np.random.default_rng(seed).standard_normal(clean.shape)
-        return Record(t, u, y, names=tuple(self.deficient.outputs), source=self.name), Truth(x, d, spread)
+        for name, k in experiment.every.items():
+            unseen = np.arange(len(t)) % k != 0
+            unseen[0] = True
+            y[unseen, list(self.deficient.outputs).index(name)] = np.nan
+        record = Record(t, u, y, names=tuple(self.deficient.outputs), source=self.name)
+        return record, Truth(np.ascontiguousarray(x[:, self._shared]), d, spread)
+
+    @property
+    def _shared(self) -> npt.NDArray[np.int64]:
+        """Where the deficient model's states stand among the truth's."""
+        assert self.truth is not None
+        places = {name: i for i, name in enumerate(self.truth.states)}
+        return np.array([places[name] for name in self.deficient.states], dtype=np.int64)
 
     def _run(self, t: Array, u: Array) -> tuple[Array, Array]:
-        """States and model error at the samples, (N, n) each; the true plant is integrated 20 times finer."""
+        """All states of the plant, (N, n), and the model error, (N, m), at the samples; integrated 20 times finer."""
         assert self.truth is not None
         assert self.experiment is not None
         # A held case is the deficient model with a push in each rate that is renewed at every sample.
         mover = _pushed(self.deficient) if self.held else self.truth
-        n = len(self.deficient.states)
-        X, D = np.zeros((len(t), n)), np.zeros((len(t), n))
+        n, m = len(self.truth.states), len(self.deficient.states)
+        X, D = np.zeros((len(t), n)), np.zeros((len(t), m))
         X[0] = self.experiment.x0
         models = (self.truth, self.deficient, mover)
-        widest = max(len(model.parameters) for model in models)
         pairs = [part for model in models for part in (model.program.rate, model.values)]
-        none, T, work = np.zeros(0, dtype=np.int64), np.zeros((n, n)), workspace(n, u.shape[1], widest, 0)
-        trajectory(*pairs, int(self.held), t, u, mover.linear_inputs, none, X, D, T, work)
+        none, inputs = np.zeros(0, dtype=np.int64), u.shape[1]
+        work = plant_workspace(n, inputs, max(len(self.truth.parameters), len(mover.parameters)))
+        part = plant_workspace(m, inputs, len(self.deficient.parameters))
+        held, linear = int(self.held), mover.linear_inputs
+        trajectory(*pairs, held, self._shared, t, u, linear, none, X, D, work, part)
         return X, D
 
 
