@@ -34,9 +34,16 @@ def add_parser(subparsers: Any) -> None:
     verbs.add_parser("tune", parents=[plan, work, store, as_json], help="only tune, with the same budget for all")
     table = verbs.add_parser("table", parents=[store, as_json], help="the results")
     table.add_argument("--rows", action="store_true", help="every cell instead of medians over seeds")
+    table.add_argument(
+        "--plan", metavar="NAME|FILE", help="the results of a plan; one of recovery has tables of its own"
+    )
     table.add_argument("--only", metavar="TEXT", help="lines with this in case, estimator or variant")
     table.add_argument("-o", "--output", type=Path, metavar="FILE", help="write .csv, .parquet or .json")
     verbs.add_parser("plot", parents=[store, out, as_json], help="figures from the stored results, nothing is run")
+    recovery = verbs.add_parser(
+        "recovery", parents=[store, out, as_json], help="how surely the missing effect is named"
+    )
+    recovery.add_argument("--plan", metavar="NAME|FILE", help="the cells of one plan, default every stored one")
     claims = verbs.add_parser("claims", parents=[as_json], help="published numbers beside ours")
     claims.add_argument("--brief", action="store_true", help="the ledger alone, without what the source leaves open")
     one = verbs.add_parser("table1", parents=[out, as_json], help="the sources' Table 1 and what better methods reach")
@@ -52,8 +59,11 @@ def _count(text: str) -> int:
 
 def run(args: argparse.Namespace) -> int:
     """Run a verb; 0 done, 2 by InputError."""
-    verb = {"list": _list, "run": _run, "tune": _run, "table": _table, "plot": _plot, "claims": _claims}
-    return verb.get(args.bench, _table_one)(args)
+    verb = {
+        "list": _list, "run": _run, "tune": _run, "table": _table, "plot": _plot, "recovery": _recovery,
+        "claims": _claims, "table1": _table_one,
+    }  # fmt: skip
+    return verb[args.bench](args)
 
 
 def _list(args: argparse.Namespace) -> int:
@@ -100,31 +110,65 @@ def _run(args: argparse.Namespace) -> int:
 
 
 def _table(args: argparse.Namespace) -> int:
-    from suite.benchmark import table
-    from suite.benchmark.store import Store
+    from suite.benchmark import plan, recovery_summary, table
 
-    with Store(args.store, must_exist=True) as store:
-        rows = store.rows()
+    chosen = plan.load(args.plan) if args.plan else None
+    rows, recovery = _stored(args.store, chosen)
     if args.only:
         rows = [row for row in rows if args.only in f"{row['case']} {row['estimator']} {row['variant']}"]
-    shown = rows if args.rows else table.lines(rows)
+    shown = rows if args.rows else recovery_summary.targets(rows) if recovery else table.lines(rows)
     if args.output:
         table.write(shown, args.output)
         print(f"{len(shown)} lines in {args.output}", file=sys.stderr)
-    if args.json:
+    if args.json or (args.rows and not args.output):
         print(table.to_json(shown))
     elif not args.output:
-        print(table.text(table.lines(rows)) if not args.rows else table.to_json(rows))
+        print(recovery_summary.text(rows) if recovery else table.text(shown))
+    return 0
+
+
+def _stored(path: Path, chosen: Any) -> tuple[list[dict[str, Any]], bool]:
+    """The rows of a plan, or of estimation where none is named; and whether they are of the recovery benchmark."""
+    from suite.benchmark import recovery_summary
+    from suite.benchmark.store import Store
+
+    with Store(path, must_exist=True) as store:
+        rows = store.rows()
+    if chosen is not None and chosen.kind == "recovery":
+        return [dict(row) for row in recovery_summary.chosen(rows, chosen.cells())], True
+    rows = [row for row in rows if row.get("kind") != "recovery"]
+    if chosen is not None:
+        wanted = {(c.case, c.noise, c.estimator, c.variant) for c in chosen.cells()}
+        rows = [row for row in rows if (row["case"], row["noise"], row["estimator"], row["variant"]) in wanted]
+    return rows, False
+
+
+def _recovery(args: argparse.Namespace) -> int:
+    from suite.benchmark import plan, recovery_summary, table
+    from suite.benchmark.store import Store
+    from suite.errors import InputError
+    from suite.report import recovery_page
+
+    cells = plan.load(args.plan).cells() if args.plan else ()
+    with Store(args.store, must_exist=True) as store:
+        rows = recovery_summary.chosen(store.rows(), cells)
+    if not rows:
+        raise InputError(
+            f"{args.store} holds no result of the recovery benchmark; run: unmodelled bench run --plan recovery"
+        )
+    paths = [str(path) for path in recovery_page.write(rows, args.output)]
+    if args.json:
+        print(table.to_json({"targets": recovery_summary.targets(rows), "files": paths}))
+    else:
+        print(recovery_summary.text(rows) + "\n\n" + "\n".join(paths))
     return 0
 
 
 def _plot(args: argparse.Namespace) -> int:
     from suite.benchmark import table
-    from suite.benchmark.store import Store
     from suite.report import bench_figures
 
-    with Store(args.store, must_exist=True) as store:
-        rows = store.rows()
+    rows, _ = _stored(args.store, None)
     paths = [str(path) for path in bench_figures.draw(rows, args.output)]
     print(table.to_json(paths) if args.json else "\n".join(paths))
     return 0

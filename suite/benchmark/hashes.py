@@ -7,6 +7,8 @@ import inspect
 import json
 import sys
 from functools import cache
+from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -16,12 +18,16 @@ import numpy as np
 import suite
 from suite import plugins
 from suite.benchmark.cells import Cell
+from suite.benchmark.recovery import OURS, RIVALS
 from suite.case import Case
 from suite.errors import DataError
 from suite.estimator import Estimator
 
 # Plug-ins share code through these packages; what they take from elsewhere is pinned by the version.
-OURS = ("estimators", "baselines", "suite.kernels", "suite.filtering", "suite.smoothing")
+SHARED = ("estimators", "baselines", "suite.kernels", "suite.filtering", "suite.smoothing")
+
+
+METHODS = (OURS, *RIVALS)
 
 
 def _digest(*parts: Any) -> str:
@@ -44,9 +50,28 @@ def plugin(estimator: Estimator) -> str:
             texts.append((name, "no source"))
         for value in list(vars(module).values()):
             used = value.__name__ if isinstance(value, ModuleType) else getattr(value, "__module__", None)
-            if isinstance(used, str) and used.startswith(OURS):
+            if isinstance(used, str) and used.startswith(SHARED):
                 todo.append(used)
     return _digest(*sorted(texts))
+
+
+# What a row of the recovery benchmark depends on, as files and folders of the packages.
+FINDING = ("suite/discovery", "suite/kernels", "suite/filtering.py", "suite/smoothing.py", "effects")
+JUDGING = ("recovery.py", "verdicts.py", "conditions.py", "columns.py")
+RIVAL = ("rivals.py", "sparse.py")
+
+
+def method(name: str) -> str:
+    """A hash of the source of a method of the recovery benchmark, of its judge and of the library of effects."""
+    root, here = Path(suite.__file__).parent.parent, Path(__file__).parent
+    paths = [
+        path for part in FINDING for path in ([root / part] if part.endswith(".py") else (root / part).glob("*.py"))
+    ]
+    paths += [here / file for file in (*JUDGING, *(() if name == OURS else RIVAL))]
+    texts = sorted((path.name, path.read_text(encoding="utf-8")) for path in paths)
+    versions = [version("pysindy")] if "pysindy" in name and find_spec("pysindy") else []
+    filters = [plugin(plugins.estimators()["generalized-ie"])] if name == "correlation" else []
+    return _digest(name, texts, sorted(plugins.effects()), versions, filters)
 
 
 def case(entry: Case, data: Path | None) -> str:
@@ -73,7 +98,7 @@ class Keys:
     """The key of every cell and every tuning, each hash computed once."""
 
     def __init__(self, data: Path | None) -> None:
-        self.plugin = cache(lambda name: plugin(plugins.estimators()[name]))
+        self.plugin = cache(lambda name: method(name) if name in METHODS else plugin(plugins.estimators()[name]))
         self.case = cache(lambda name: case(plugins.cases()[name], data))
 
     def tuning(self, name: str, noise: float, estimator: str) -> str:

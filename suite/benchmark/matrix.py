@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import fnmatch
 import os
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from suite.benchmark.cells import Cell
 from suite.benchmark.hashes import Keys
 from suite.benchmark.plan import Plan
 from suite.benchmark.progress import Progress
+from suite.benchmark.recovery import recovers
 from suite.benchmark.store import Store
 from suite.errors import DataError, InputError
 
@@ -78,13 +80,15 @@ def run(
     tasks = []
     for cell in fresh:
         values = tuned[keys.tuning(cell.case, cell.noise, cell.estimator)] if cell.variant == "tuned" else {}
-        tasks.append(pool.Task("suite.benchmark.cells:run", (cell, values, data), cell))
+        module = "recovery" if recovers(cell) else "cells"
+        tasks.append(pool.Task(f"suite.benchmark.{module}:run", (cell, values, data), cell))
     versions = _versions()
     with Progress("cells", len(tasks), quiet=quiet) as progress:
         for task, outcome in pool.run(tasks, jobs, limit):
             cell, row = task.label, outcome
             if isinstance(outcome, pool.Failure):
                 row = {"status": "time-out" if outcome.status == "time-out" else "error", "reason": outcome.reason}
+                row |= {"kind": "recovery"} if recovers(cell) else {}
             hashes = {"plugin_hash": keys.plugin(cell.estimator), "case_hash": keys.case(cell.case)}
             store.put(cell, keys.cell(cell), {**row, **hashes, "versions": versions})
             statuses[row["status"]] += 1
@@ -125,9 +129,12 @@ def _tune(
 
 
 def _versions() -> dict[str, str]:
-    return {
+    versions = {
         "unmodelled": suite.__version__,
         "numpy": np.__version__,
         "numba": numba.__version__,
         "filterpy": version("filterpy"),
     }
+    with contextlib.suppress(PackageNotFoundError):
+        versions["pysindy"] = version("pysindy")
+    return versions

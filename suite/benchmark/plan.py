@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import fnmatch
 import tomllib
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 from suite import plugins
 from suite.benchmark.cells import Cell
+from suite.benchmark.conditions import CONDITIONS, inapplicable
+from suite.benchmark.recovery import OURS, RIVALS
+from suite.case import Case
 from suite.errors import InputError
 
 SHIPPED = Path(__file__).parent / "plans"
 VARIANTS = ("default", "tuned")
+KINDS = ("estimation", "recovery")
 
 
 @dataclass(frozen=True)
@@ -22,6 +27,11 @@ class Plan:
     """Patterns of names (shell style) and what they are crossed with; `noises` empty: those that each case states.
 
     `seeds` counts the judged seeds 0..seeds-1 of simulated cases; `limit` is the time-out of one cell in seconds.
+    `exclude` are patterns of cases left out; with `tags` a case must have one of them; `most_states` bounds its size.
+
+    Kind "estimation" judges estimates of states and model error. Kind "recovery" judges whether a method names what is
+    missing: its `estimators` are the methods, its `variants` the conditions, `seeds_of` the seeds of a condition or
+    method that has fewer, `rival_variants` the conditions that rival methods are judged under.
     """
 
     name: str
@@ -32,12 +42,20 @@ class Plan:
     noises: tuple[float, ...] = ()
     seeds: int = 20
     limit: float = 60.0
+    kind: str = "estimation"
+    exclude: tuple[str, ...] = ()
+    tags: tuple[str, ...] = ()
+    most_states: int | None = None
+    seeds_of: Mapping[str, int] = field(default_factory=dict)
+    rival_variants: tuple[str, ...] = CONDITIONS
 
     def cells(self, runs: dict[str, int] | None = None) -> list[Cell]:
         """Every cell. A measured case (noise 0, as it is) is judged untuned, once a run: `runs` by case, else one."""
-        cases, estimators = plugins.cases(), plugins.estimators()
+        if self.kind == "recovery":
+            return self._recovery_cells()
+        estimators = plugins.estimators()
         cells = []
-        for case in (cases[name] for name in _chosen(self.cases, cases, "case")):
+        for case in self.chosen_cases():
             measured = case.truth is None
             for noise in (0.0,) if measured else self.noises or case.noises:
                 for name in _chosen(self.estimators, estimators, "estimator"):
@@ -46,6 +64,32 @@ class Plan:
                             continue
                         count = (runs or {}).get(case.name, 1) if measured else self.seeds
                         cells += [Cell(case.name, noise, name, variant, seed) for seed in range(count)]
+        return cells
+
+    def chosen_cases(self) -> list[Case]:
+        """The cases of the plan."""
+        cases = plugins.cases()
+        chosen = [cases[name] for name in _chosen(self.cases, cases, "case")]
+        return [
+            case for case in chosen
+            if not any(fnmatch.fnmatchcase(case.name, pattern) for pattern in self.exclude)
+            and (not self.tags or set(self.tags) & set(getattr(case, "tags", ())))
+            and (self.most_states is None or len(case.deficient.states) <= self.most_states)
+        ]  # fmt: skip
+
+    def _recovery_cells(self) -> list[Cell]:
+        """Every case under the conditions that it has, for every method; a measured case has none."""
+        effects = plugins.effects()
+        methods = _chosen(self.estimators, dict.fromkeys((OURS, *RIVALS)), "method")
+        cells = []
+        for case, method, condition in product(self.chosen_cases(), methods, self.variants):
+            if method != OURS and condition not in self.rival_variants:
+                continue
+            if inapplicable(case, condition, effects) is not None:
+                continue
+            count = min(self.seeds, self.seeds_of.get(condition, self.seeds), self.seeds_of.get(method, self.seeds))
+            noises = [noise for noise in self.noises or case.noises if noise > 0]
+            cells += [Cell(case.name, noise, method, condition, seed) for noise in noises for seed in range(count)]
         return cells
 
 
@@ -79,10 +123,16 @@ def parse(table: dict[str, Any], name: str, source: str) -> Plan:
         "sentence": (str, "text"),
         "cases": (list, "a list of names"),
         "estimators": (list, "a list of names"),
-        "variants": (list, "a list of default, tuned"),
+        "variants": (list, "a list of default, tuned; of conditions in a plan of recovery"),
         "noises": (list, "a list of fractions"),
         "seeds": (int, "a whole number"),
         "limit": ((int, float), "seconds"),
+        "kind": (str, "estimation or recovery"),
+        "exclude": (list, "a list of names"),
+        "tags": (list, "a list of tags"),
+        "most_states": (int, "a whole number"),
+        "seeds_of": (dict, "a table of seeds by condition or method"),
+        "rival_variants": (list, "a list of conditions"),
     }
     for key, value in table.items():
         if key not in kinds:
@@ -92,9 +142,21 @@ def parse(table: dict[str, Any], name: str, source: str) -> Plan:
         inner: Any = (int, float) if key == "noises" else str
         if isinstance(value, list) and not all(isinstance(item, inner) for item in value):
             raise InputError(f"{source}: {key} = {value!r}; expected {kinds[key][1]}")
-    if not set(table.get("variants", [])) <= set(VARIANTS):
-        raise InputError(f"{source}: variants = {table['variants']!r}; expected some of {', '.join(VARIANTS)}")
+    if table.get("kind", "estimation") not in KINDS:
+        raise InputError(f"{source}: kind = {table['kind']!r}; expected one of {', '.join(KINDS)}")
+    recovery = table.get("kind") == "recovery"
+    known = CONDITIONS if recovery else VARIANTS
+    for key in ("variants", "rival_variants"):
+        if not set(table.get(key, [])) <= set(known):
+            raise InputError(f"{source}: {key} = {table[key]!r}; expected some of {', '.join(known)}")
+    counts = table.get("seeds_of", {})
+    if not all(
+        name in (*CONDITIONS, OURS, *RIVALS) and isinstance(count, int) and count > 0 for name, count in counts.items()
+    ):
+        raise InputError(f"{source}: seeds_of = {counts!r}; expected whole numbers by condition or method")
     if table.get("seeds", 1) < 1 or table.get("limit", 1) <= 0 or min(table.get("noises", [0])) < 0:
         raise InputError(f"{source}: seeds and limit must be positive, noises not negative; mend the plan")
+    if recovery:
+        table = {"variants": list(CONDITIONS), **table}
     grown: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}
     return Plan(name, **{"sentence": "", **grown})

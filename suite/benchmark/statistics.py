@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import rankdata, wilcoxon
+from scipy.stats import norm, rankdata, wilcoxon
 
 Array = npt.NDArray[np.float64]
 RESAMPLES = 2000
@@ -20,6 +20,26 @@ def interval(values: Array, level: float = 0.95) -> tuple[float, float, float]:
     medians = np.sort(np.median(values[picks], axis=1))
     low, high = (medians[round(share * (RESAMPLES - 1))] for share in ((1 - level) / 2, (1 + level) / 2))
     return float(np.median(values)), float(low), float(high)
+
+
+def wilson(hits: int, count: int, level: float = 0.95) -> tuple[float, float, float]:
+    """A share and its interval (Wilson 1927), which holds at 0 and at 1 too; NaN, 0, 1 where nothing was counted."""
+    if count == 0:
+        return float("nan"), 0.0, 1.0
+    z = float(norm.ppf(0.5 + level / 2))
+    share, weight = hits / count, 1.0 / (1.0 + z * z / count)
+    middle = weight * (share + z * z / (2 * count))
+    half = weight * z * np.sqrt(share * (1 - share) / count + z * z / (4 * count * count))
+    return share, float(max(middle - half, 0.0)), float(min(middle + half, 1.0))
+
+
+def resampled(values: Array, figure: Callable[[Array], Any], level: float = 0.95) -> tuple[float, float, float]:
+    """A figure of values (figure(table, over the last axis)) and its bootstrap percentile interval."""
+    if len(values) == 0:
+        return float("nan"), float("nan"), float("nan")
+    picks = np.random.default_rng(0).integers(0, len(values), (RESAMPLES, len(values)))
+    low, high = np.quantile(figure(values[picks]), [(1 - level) / 2, (1 + level) / 2])
+    return float(figure(values)), float(low), float(high)
 
 
 def paired_ratio(mine: Mapping[int, float], reference: Mapping[int, float]) -> tuple[float, float, float] | None:
