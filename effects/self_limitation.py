@@ -5,7 +5,7 @@ from suite.effect import Effect
 EFFECT = Effect(
     id="self_limitation",
     term="-a*x**2",
-    roles={"x": "state"},
+    roles={"x": "content"},
     sentence="Growth limits itself: crowding, saturation of a resource.",
     dimension="1/(state time)",
     sign=1,

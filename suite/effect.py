@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 Role = Literal[
-    "position", "rate", "state", "any", "other", "deviation", "temperature", "level",
-    "output", "input", "late", "held", "parameter", "clock",
+    "position", "angle", "rate", "state", "content", "any", "other", "deviation", "temperature", "level",
+    "output", "input", "late", "held", "parameter", "fixed", "clock",
 ]  # fmt: skip
 
 
@@ -48,14 +48,14 @@ class Effect:
     with its sign, so that a positive coefficient is the physical one. `forms` are further texts of the same effect,
     such as a stop on the other side; each is a candidate of its own. Where it acts follows from the roles:
 
-    - in a rate: "position" and "rate" are a pair p' = v with the effect in v'; "state" is the state in whose equation it
-      acts, where that has no position; "any" is either; "other" another state; "deviation" the state minus the level
+    - in a rate: "position" and "rate" are a pair p' = v with the effect in v', "angle" a position that is an angle; "state" is the state in whose equation it
+      acts, where that has no position; "content" is such a state that is no temperature; "any" is either; "other" another state; "deviation" the state minus the level
       that its equation relaxes to (itself where there is none); "temperature" an absolute temperature, "level" its
       ambient;
     - in a measurement: "output" is the output's own equation, to which the term is added;
     - in an input: "input" is the input, which becomes input + term wherever it acts; "late" is the input as it was one
       coefficient earlier, "held" as it is when held the other way between samples;
-    - in a parameter: "parameter" becomes parameter + term wherever it stands;
+    - in a parameter: "parameter" becomes parameter + term wherever it stands; "fixed" is one that is said to be exact;
     - in the clock: "clock" stands for every rate, times which the term is added.
 
     `sign` is 1 for a coefficient that cannot be negative (a loss), 0 for either sign. `pinned`: the coefficient is

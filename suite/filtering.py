@@ -57,6 +57,9 @@ def filtered(
     program, N = model.program, len(record)
     n, m = program.n, program.outputs_count
     density = np.diag(Q) if np.ndim(Q) == 1 else Q
+    if (np.shape(x0), np.shape(P0), density.shape) != ((n,), (n, n), (n, n)):
+        shapes = f"x0 {np.shape(x0)}, P0 {np.shape(P0)}, Q {np.shape(Q)}"
+        raise ValueError(f"expected x0 ({n},), P0 ({n}, {n}) and Q ({n},) or ({n}, {n}) for {n} states, got {shapes}")
     X, Xp = np.zeros((N, n)), np.zeros((N, n))
     P, Pp, Phi, Qd = (np.zeros((N, n, n)) for _ in range(4))
     H, K = np.zeros((N, m, n)), np.zeros((N, m, n))

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import keyword
 import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any, Literal
 
 import numpy as np
@@ -15,14 +15,14 @@ import numpy.typing as npt
 import sympy
 
 from suite import expressions
+from suite.effect import Effect
 from suite.errors import ModelError
 from suite.kernels import codegen
 from suite.kernels.integrate import transition
+from suite.names import check_names
 
 Array = npt.NDArray[np.float64]
 Hold = Literal["previous", "linear"]
-
-NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}\Z")
 
 
 @dataclass(frozen=True)
@@ -52,10 +52,14 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Input:
-    """A measured input: its column, and what it does between samples ("previous": constant, "linear": a line)."""
+    """A measured input: its column, and what it does between samples ("previous": constant, "linear": a line).
+
+    `delay` names the parameter by which it acts later than it was measured, in units of time.
+    """
 
     column: str
     hold: Hold = "previous"
+    delay: str | None = None
 
 
 @dataclass(frozen=True)
@@ -81,7 +85,8 @@ class Model:
     """An ODE model x' = f(x, u, t; p), y = h(x, u, t; p), as text with everything known beside it.
 
     The text of the equations is the data; functions, Jacobians and LaTeX follow from it. Models are never changed:
-    `plus`, `with_values` and `with_disturbance` return new ones. Raises ModelError with the place and the mend.
+    `plus`, `with_values` and `with_disturbance` return new ones. `units` names the unit of states, inputs and t;
+    `effects` are the user's own. Raises ModelError with the place and the mend.
     """
 
     name: str
@@ -92,10 +97,12 @@ class Model:
     initial: Mapping[str, Initial] = field(default_factory=dict)
     suspect: tuple[str, ...] | None = None
     time: str | None = None
+    units: Mapping[str, str] = field(default_factory=dict)
+    effects: tuple[Effect, ...] = ()
     source: str = field(default="model", compare=False)
 
     def __post_init__(self) -> None:
-        self._check_names()
+        check_names(self)
         # Parsing here means that a Model that exists has sound equations.
         _ = self.rates, self.output_expressions
 
@@ -188,18 +195,50 @@ class Model:
             self.program, t, np.asarray(x, dtype=np.float64), start, end, self.linear_inputs, self.values, dt
         )
 
-    def plus(self, equation: str, term: str, parameters: Mapping[str, Parameter]) -> Model:
-        """The model with `term` (text that opens with its sign) added to a state's rate or to an output."""
-        if equation in self.states:
-            changed: dict[str, Any] = {"states": {**self.states, equation: f"{self.states[equation]} {_signed(term)}"}}
-        elif equation in self.outputs:
-            output = self.outputs[equation]
-            grown = replace(output, equation=f"{output.equation} {_signed(term)}")
-            changed = {"outputs": {**self.outputs, equation: grown}}
+    def plus(
+        self,
+        place: str,
+        term: str,
+        parameters: Mapping[str, Parameter] = MappingProxyType({}),
+        states: Mapping[str, str] = MappingProxyType({}),
+        initial: Mapping[str, Initial] = MappingProxyType({}),
+    ) -> Model:
+        """The model with `term` (text that opens with its sign) added to a state's rate or to an output; to an input
+        or a parameter wherever that stands; or (`place` is t, a clock that runs wrong) times every rate to every rate.
+
+        `states` come along, with their rates and `initial` values; they are not in doubt.
+        """
+        rates = dict(self.states)
+        texts = {name: output.equation for name, output in self.outputs.items()}
+        if place in rates:
+            rates[place] = f"{rates[place]} {_signed(term)}"
+        elif place in texts:
+            texts[place] = f"{texts[place]} {_signed(term)}"
+        elif place in self.inputs or place in self.parameters:
+            changed = f"({place} {_signed(term)})"
+            rates = {name: _replaced(text, place, changed) for name, text in rates.items()}
+            texts = {name: _replaced(text, place, changed) for name, text in texts.items()}
+        elif place == expressions.TIME:
+            rates = {name: f"(1 {_signed(term)})*({text})" for name, text in rates.items()}
         else:
-            known = ", ".join([*self.states, *self.outputs])
-            raise ModelError(f"{self.source}: no equation {equation!r} to add a term to; choose one of {known}")
-        return replace(self, parameters={**self.parameters, **parameters}, **changed)
+            known = ", ".join([*self.states, *self.outputs, *self.inputs, *self.parameters])
+            raise ModelError(f"{self.source}: no equation {place!r} to add a term to; choose one of {known}")
+        in_doubt = self.suspects if states or place == expressions.TIME else self.suspect
+        return replace(
+            self,
+            states={**rates, **states},
+            outputs={name: replace(output, equation=texts[name]) for name, output in self.outputs.items()},
+            parameters={**self.parameters, **parameters},
+            initial={**self.initial, **initial},
+            suspect=in_doubt,
+        )
+
+    def with_input(self, name: str, parameters: Mapping[str, Parameter], delay: str | None, hold: Hold) -> Model:
+        """The model with an input that acts later, by the parameter `delay`, or is held otherwise between samples."""
+        changed = replace(self.inputs[name], hold=hold, delay=delay or self.inputs[name].delay)
+        return replace(
+            self, inputs={**self.inputs, name: changed}, parameters={**self.parameters, **parameters}
+        )
 
     def with_values(self, values: Mapping[str, float]) -> Model:
         """The model with other parameter values; everything known about them stays."""
@@ -234,25 +273,10 @@ class Model:
         rows += [f"{name} = {output.equation}" for name, output in self.outputs.items()]
         return "\n".join(rows)
 
-    def _check_names(self) -> None:
-        if not self.states:
-            raise ModelError(f'{self.source}: no states; add a table [states] with one rate a line, such as x = "-k*x"')
-        seen: dict[str, str] = {}
-        tables = {"states": self.states, "parameters": self.parameters, "inputs": self.inputs}
-        for table, entries in tables.items():
-            for name in entries:
-                if not NAME.match(name):
-                    raise ModelError(f"{self.source}, [{table}] {name!r}: a name is letters, digits and _; rename it")
-                if name in expressions.RESERVED or keyword.iskeyword(name):
-                    raise ModelError(f"{self.source}, [{table}] {name}: the name is taken by the language; rename it")
-                if name in seen:
-                    raise ModelError(f"{self.source}, [{table}] {name}: already declared in [{seen[name]}]; rename one")
-                seen[name] = table
-        for table, named in (("initial", self.initial), ("suspect] equations [", self.suspect or ())):
-            for name in named:
-                if name not in self.states:
-                    label = table.removesuffix("] equations [")
-                    raise ModelError(f"{self.source}, [{label}] {name}: no such state; it has {', '.join(self.states)}")
+
+def _replaced(text: str, name: str, by: str) -> str:
+    """The text with a name replaced wherever it stands as a word of its own."""
+    return re.sub(rf"(?<![A-Za-z0-9_]){name}(?![A-Za-z0-9_])", by, text)
 
 
 def _signed(term: str) -> str:

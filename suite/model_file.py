@@ -87,7 +87,12 @@ def _parameter(entry: Parameter) -> Any:
 
 
 def _input(entry: Input) -> Any:
-    return entry.column if entry.hold == "previous" else {"column": entry.column, "hold": entry.hold}
+    table = {"column": entry.column}
+    if entry.hold != "previous":
+        table["hold"] = entry.hold
+    if entry.delay is not None:
+        table["delay"] = entry.delay
+    return entry.column if len(table) == 1 else table
 
 
 def _output(name: str, entry: Output) -> Any:
@@ -206,12 +211,13 @@ class _Reader(Document):
         place = f"[inputs] {name}"
         if not isinstance(value, dict):
             return Input(self.text(place, value, "column name"))
-        entry = self.entry(place, value, ("column", "hold"))
+        entry = self.entry(place, value, ("column", "hold", "delay"))
         column = self.text(f"{place} column", entry.get("column", name), "force")
         hold: Hold = entry.get("hold", "previous")
         if hold not in ("previous", "linear"):
             raise self.refuse(place, f"hold is {said(hold)}", 'write hold = "previous" or hold = "linear"')
-        return Input(column, hold)
+        delay = self.text(f"{place} delay", entry["delay"], "tau") if "delay" in entry else None
+        return Input(column, hold, delay)
 
     def output(self, name: str, value: Any) -> Output:
         place = f"[outputs] {name}"

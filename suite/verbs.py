@@ -15,10 +15,11 @@ from typing import Any
 
 from suite import plugins
 from suite.discovery import checkup, misfit
-from suite.discovery.fit import fit
-from suite.discovery.library import Term, candidates, grown
+from suite.discovery.fit import fit, prepare
+from suite.discovery.library import candidates
 from suite.discovery.loop import discover as loop
 from suite.discovery.result import Verdict
+from suite.discovery.terms import Term, grown
 from suite.discovery.verdict import diagnose as verdict_on
 from suite.discovery.words import effect as effect_words
 from suite.discovery.words import headline, value_sd, weight
@@ -200,16 +201,15 @@ def add(args: argparse.Namespace) -> int:
 
 def _chosen(model: Model, effect: str, equation: str | None) -> Term:
     """The one candidate that is meant; where several are, the sentence names them."""
-    if equation is not None and equation not in model.states:
-        raise InputError(f"--equation {equation}: no such state; the model has {', '.join(model.states)}")
+    places = [*model.states, *model.outputs, *model.inputs]
+    if equation is not None and equation not in places:
+        raise InputError(f"--equation {equation}: nothing is called that; the model has {', '.join(places)}")
     every = candidates(model, {effect: plugins.effects()[effect]}, absolute=True)
     terms = [t for t in every if equation in (None, t.equation)]
-    if len(terms) == 1:
-        return terms[0]
     if not terms:
-        where = f" in {equation}'" if equation else ""
+        where = f" in {equation}" if equation else ""
         raise InputError(
-            f"{effect} has no role to play{where}: no state there is what it acts on; see docs/model-file.md"
+            f"{effect} has no role to play{where}: nothing there is what it acts on; see docs/model-file.md"
         )
     equations = sorted({t.equation for t in terms})
     if len(equations) > 1:
@@ -219,17 +219,16 @@ def _chosen(model: Model, effect: str, equation: str | None) -> Term:
 
 def _numbers(model: Model, term: Term, record: Record | None) -> Mapping[str, Parameter]:
     """Start values of a new term's parameters: coefficients zero, inner scales in the middle of the visited range."""
-    from suite.discovery.fit import prepare
-
-    spread: Mapping[str, float] = {}
-    length = 1.0
-    if record is not None:
-        problem = prepare(model, record)
-        spread, length = problem.spread, problem.length
     free = {name: Parameter(0.0, free=True) for name in term.coefficients}
-    for name, inner in term.inner.items():
-        unit = term.scale(name, spread, length)
-        free[name] = Parameter(inner.start * unit, free=True, bounds=(inner.low * unit, inner.high * unit))
+    free |= {z: Parameter(0.0) for z in term.states}
+    if record is None:
+        scales = {n: Parameter(i.start, free=True, bounds=(i.low, i.high)) for n, i in term.inner.items()}
+        return free | scales
+    problem = prepare(model, record, (term,))
+    low, high = problem.limits
+    free |= {z: Parameter(float(problem.start.x0[0, j])) for z, j in zip(term.states, problem.states(0), strict=True)}
+    for name, j in zip(term.names, problem.places(0), strict=True):
+        free[name] = Parameter(float(problem.start.p[j]), free=True, bounds=(float(low[j]), float(high[j])))
     return free
 
 

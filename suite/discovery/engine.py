@@ -6,6 +6,7 @@ L = n ln(mean e^2) + sum ln s + sum ((p - p0)/sd)^2, with the noise's common sca
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -13,9 +14,10 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from suite.discovery.library import Term, gates
+from suite import expressions
+from suite.delays import channels
 from suite.discovery.noise import QUIETEST, spans
-from suite.errors import DataError
+from suite.discovery.terms import Term, gates
 from suite.kernels import codegen
 from suite.kernels.integrate import workspace
 from suite.kernels.prediction import prediction_errors
@@ -28,7 +30,7 @@ Index = npt.NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Point:
-    """Where a hypothesis stands: x0 (runs, n) and p (all parameters, the candidates' among them)."""
+    """Where a hypothesis stands: x0 (runs, n + states of all candidates) and p (all parameters, the candidates' too)."""
 
     x0: Array
     p: Array
@@ -36,7 +38,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Pass:
-    """One pass: e (M,) errors in noise units, J (M, theta), logs = sum ln s, Y (N, outputs), X (N, n)."""
+    """One pass: e (M,) errors in noise units, J (M, theta), logs = sum ln s, Y (N, outputs), X (N, active states)."""
 
     e: Array
     J: Array
@@ -44,6 +46,19 @@ class Pass:
     Y: Array
     X: Array
     finite: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """What a set of active candidates makes of theta: switches on (gates,), the states that run (indices into
+    Point.x0's columns), which of them are free at the start (positions among those), and the parameters that move.
+    """
+
+    active: tuple[int, ...]
+    on: Index
+    states: Index
+    free: Index
+    columns: Index
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +76,7 @@ class Problem:
     substeps: int = 1
     frozen: bool = False  # fits move initial states only
     scale: float | None = None  # the noise's variance in units of R, where it is known and not profiled
+    dropped: int = 0  # samples left out as outliers
 
     @cached_property
     def _extension(self) -> tuple[tuple[str, ...], tuple[codegen.Gate, ...]]:
@@ -73,23 +89,69 @@ class Problem:
 
     @cached_property
     def program(self) -> codegen.Program:
-        if not self.terms:
+        if not self.terms and not self._late:
             return self.model.program
+        inputs, late = list(self.model.inputs), self._late
+        extra = [f"{inputs[j]}__{channel}" for j in late for channel in ("late", "slope", "tau")]
+        extra += [f"{inputs[j]}__held" for j in self._held]
+        act = self._acting
         return codegen.compile_program(
             states=tuple(self.model.states),
-            inputs=tuple(self.model.inputs),
+            inputs=(*inputs, *extra),
             parameters=self.names,
-            rates=self.model.rates,
-            outputs=self.model.output_expressions,
-            gates=self._extension[1],
+            rates=[act(rate) for rate in self.model.rates],
+            outputs=[act(output) for output in self.model.output_expressions],
+            gates=[gate.through(act) for gate in self._extension[1]],
         )
+
+    def _acting(self, expression: codegen.Expr) -> codegen.Expr:
+        """The expression with the inputs that the model itself delays as they act."""
+        for name, entry in self.model.inputs.items():
+            if entry.delay is not None:
+                F, late, slope, tau = (expressions.symbol(f"{name}{c}") for c in ("", "__late", "__slope", "__tau"))
+                expression = expression.subs(F, late - (expressions.symbol(entry.delay) - tau) * slope)
+        return expression
+
+    @cached_property
+    def _late(self) -> dict[int, int]:
+        """The parameter that each delayed input is delayed by, by the input's number."""
+        names = list(self.model.inputs)
+        own = {j: list(self.model.parameters).index(e.delay) for j, e in enumerate(self.model.inputs.values()) if e.delay}
+        offered = {
+            names.index(term.symbol): self.places(k)[0] for k, term in enumerate(self.terms) if "__late" in term.text
+        }
+        return own | offered
+
+    @cached_property
+    def _held(self) -> tuple[int, ...]:
+        """Inputs that a candidate holds the other way between samples."""
+        names = list(self.model.inputs)
+        return tuple(names.index(term.symbol) for term in self.terms if re.search(r"__held\b", term.text))
+
+    @cached_property
+    def linear(self) -> Array:
+        """1 where an input of the program runs on a line between samples, (inputs,)."""
+        own = self.model.linear_inputs
+        return np.concatenate([own, *(np.full(3, own[j]) for j in self._late), 1.0 - own[list(self._held)]])
+
+    def inputs(self, p: Array) -> Array:
+        """The program's inputs at the delays in p, (N, inputs)."""
+        if not self._late and not self._held:
+            return self.record.u
+        delays = {j: float(p[place]) for j, place in self._late.items()}
+        known = self.__dict__.setdefault("_inputs", {})
+        key = tuple(delays.values())
+        if key not in known:
+            known.clear()
+            known[key] = channels(self.record, delays, dict.fromkeys(self._held, True))
+        return np.asarray(known[key])
 
     @cached_property
     def seen(self) -> npt.NDArray[np.bool_]:
         """Which measurements are there, (N, outputs)."""
         return ~np.isnan(self.record.y)
 
-    @property
+    @cached_property
     def count(self) -> int:
         """How many measurements there are."""
         return int(self.seen.sum())
@@ -106,24 +168,41 @@ class Problem:
         """Bounds of all parameters: the file's, the sign of a loss, the range of an inner scale."""
         low = [p.bounds[0] for p in self.model.parameters.values()]
         high = [p.bounds[1] for p in self.model.parameters.values()]
-        spread, length = self.spread, self.length
         for term in self.terms:
             low += [0.0 if term.effect.sign else -np.inf] * len(term.coefficients)
             high += [np.inf] * len(term.coefficients)
             for name, inner in term.inner.items():
-                unit = term.scale(name, spread, length)
-                low.append(inner.low * unit)
-                nyquist = np.pi / self.step
-                high.append(min(inner.high * unit, nyquist) if inner.of == "frequency" else inner.high * unit)
+                zero, unit = self.unit(term, name)
+                low.append(zero + inner.low * unit)
+                top = zero + inner.high * unit
+                high.append(min(top, np.pi / self.step) if inner.of == "frequency" else top)
         return np.array(low), np.array(high)
 
+    def unit(self, term: Term, name: str) -> tuple[float, float]:
+        """The zero and the unit in which an inner scale's start and range are given."""
+        low, high = self.reach.get(term.variable, (0.0, 1.0))
+        match term.inner[name].of:
+            case "spread":
+                return 0.0, (high - low) or 1.0
+            case "range":
+                return low, (high - low) or 1.0
+            case "frequency":
+                return 0.0, 2.0 * np.pi / self.length
+            case "time":
+                return 0.0, self.length
+            case "step":
+                return 0.0, self.step
+            case _:
+                return 0.0, 1.0
+
     @cached_property
-    def spread(self) -> dict[str, float]:
-        """The visited range of every state: of its output where it is measured, else of the path at the start."""
-        ranges = {}
-        for i, name in enumerate(self.model.states):
-            ranges[name] = float(np.ptp(self.path[:, i])) or 1.0
-        return ranges
+    def reach(self) -> dict[str, tuple[float, float]]:
+        """The visited range of every state (along the path at the start), input and output, and of the time."""
+        columns = dict(zip(self.model.states, self.path.T, strict=True))
+        columns |= dict(zip(self.model.inputs, self.record.u.T, strict=True))
+        columns |= {name: y[~np.isnan(y)] for name, y in zip(self.model.outputs, self.record.y.T, strict=True)}
+        columns |= {"t": self.record.t}
+        return {name: (float(c.min()), float(c.max())) if len(c) else (0.0, 1.0) for name, c in columns.items()}
 
     @property
     def length(self) -> float:
@@ -135,33 +214,60 @@ class Problem:
         """The median step of the first run."""
         return float(np.median(self.record.runs[0].dt))
 
-    def columns(self, active: Sequence[int]) -> Index:
-        """Indices of the parameters that a fit with these candidates moves."""
-        if self.frozen:
-            return np.zeros(0, dtype=np.int64)
-        base = len(self.model.parameters)
-        sds = self.prior[1][:base]
-        chosen = [j for j in range(base) if sds[j] > 0]
-        for k in active:
-            chosen += self.places(k)
-        return np.array(chosen, dtype=np.int64)
+    @cached_property
+    def _places(self) -> tuple[tuple[list[int], ...], tuple[list[int], ...]]:
+        """Where each candidate's parameters stand in p, and its states in x0."""
+        p, x = len(self.model.parameters), len(self.model.states)
+        parameters, states = [], []
+        for term in self.terms:
+            parameters.append(list(range(p, p + len(term.names))))
+            states.append(list(range(x, x + len(term.states))))
+            p, x = p + len(term.names), x + len(term.states)
+        return tuple(parameters), tuple(states)
 
     def places(self, k: int) -> list[int]:
         """Indices of candidate k's parameters."""
-        at = len(self.model.parameters) + sum(len(term.names) for term in self.terms[:k])
-        return list(range(at, at + len(self.terms[k].names)))
+        return self._places[0][k]
 
-    def run(self, point: Point, q: float, active: Sequence[int] = (), columns: Index | None = None) -> Pass:
-        """One pass at process-noise level q, with the given candidates on.
+    def states(self, k: int) -> list[int]:
+        """Indices of the states that candidate k brings along."""
+        return self._places[1][k]
 
-        J's columns: the free initial states of run 0, 1, ..., then `columns` (default: what a fit would move).
-        """
-        program, record = self.program, self.record
+    def columns(self, active: Sequence[int]) -> Index:
+        """Indices of the parameters that a fit with these candidates moves; a pinned coefficient stays."""
+        if self.frozen:
+            return np.zeros(0, dtype=np.int64)
+        sds = self.prior[1]
+        chosen = [j for j in range(len(self.model.parameters)) if sds[j] > 0]
+        for k in active:
+            skipped = len(self.terms[k].coefficients) if self.terms[k].effect.pinned else 0
+            chosen += self.places(k)[skipped:]
+        return np.array(chosen, dtype=np.int64)
+
+    def layout(self, active: Sequence[int], also: Sequence[int] = (), columns: Index | None = None) -> Layout:
+        """Theta for a set of candidates; those of `also` run too, but nothing of theirs is free unless in `columns`."""
+        n = len(self.model.states)
+        on = self.program.all_off()
+        running, free = list(range(n)), np.flatnonzero(self.free_x0).tolist()
+        for k in (*active, *also):
+            brought = self.states(k)
+            on[k] = len(running) if brought else 1
+            if k not in also:
+                flags = [z[2] for z in self.terms[k].states.values()]
+                free += [len(running) + i for i, flag in enumerate(flags) if flag]
+            running += brought
         moved = self.columns(active) if columns is None else columns
-        on = program.all_off()
-        on[list(active)] = 1
+        return Layout(tuple(active), on, np.array(running), np.array(free, dtype=np.int64), moved)
+
+    def run(self, point: Point, q: float, layout: Layout | None = None) -> Pass:
+        """One pass at process-noise level q, with the candidates of the layout on.
+
+        J's columns: the free initial states of run 0, 1, ..., then the layout's parameters.
+        """
+        at = self.layout(()) if layout is None else layout
+        program, record = self.program, self.record
         N, ny = record.y.shape
-        n, m = program.n, len(moved)
+        n, m = len(at.states), len(at.columns)
         e, s, Y = np.zeros((N, ny)), np.ones((N, ny)), np.zeros((N, ny))
         X, J = np.zeros((N, n)), np.zeros((N, ny, n + m))
         wide = (n, n + m)
@@ -169,17 +275,19 @@ class Problem:
             np.zeros(n), np.zeros(ny), np.zeros((ny, n)), np.zeros((ny, program.parameters)),
             np.zeros((n, n)), np.zeros((n, n)), np.zeros(wide), np.zeros(wide), np.zeros(wide), np.zeros(n),
         )  # fmt: skip
-        Q = q * 10.0 * self.weights**2 * self.step
+        Q = np.zeros(n)
+        Q[: len(self.weights)] = q * 10.0 * self.weights**2 * self.step
+        u = self.inputs(point.p)
         failed = prediction_errors(
-            program.rate, program.output, record.t, record.u, self.model.linear_inputs, record.y, record.bounds,
-            np.ascontiguousarray(point.x0), point.p, on, moved, Q, self.R, self.angles, self.substeps,
-            workspace(n, program.inputs, program.parameters, m), scratch, e, s, J, X, Y,
+            program.rate, program.output, record.t, u, self.linear, record.y, record.bounds,
+            np.ascontiguousarray(point.x0[:, at.states]), point.p, at.on, at.columns, Q, self.R, self.angles,
+            self.substeps, workspace(n, u.shape[1], program.parameters, m), scratch, e, s, J, X, Y,
         )  # fmt: skip
         seen = self.seen
         with np.errstate(invalid="ignore", divide="ignore"):
             logs = float(np.log(s[seen]).sum())
         finite = failed < 0 and bool(np.isfinite(e).all())
-        return Pass(e[seen], self._scatter(J), logs, self._turned(Y), X, finite)
+        return Pass(e[seen], self._scatter(J, at), logs, self._turned(Y), X, finite)
 
     def _turned(self, Y: Array) -> Array:
         """Simulated angles in the turn of their measurement."""
@@ -191,12 +299,11 @@ class Problem:
 
     @cached_property
     def angles(self) -> Array:
-        return np.array([float(output.angle) for output in self.model.outputs.values()])
+        return self.model.angles
 
-    def _scatter(self, J: Array) -> Array:
+    def _scatter(self, J: Array, at: Layout) -> Array:
         """Each run's own initial-state columns at their place in theta; rows of missing samples left out."""
-        n = self.program.n
-        free = np.flatnonzero(self.free_x0)
+        n, free = len(at.states), at.free
         runs = len(self.record.starts)
         if runs == 1:
             keep = np.concatenate([free, np.arange(n, J.shape[2])])
@@ -209,11 +316,12 @@ class Problem:
         wide[:, :, runs * len(free) :] = J[:, :, n:]
         return wide[self.seen]
 
-    def cost(self, passed: Pass, point: Point, columns: Index) -> float:
+    def cost(self, passed: Pass, point: Point, layout: Layout) -> float:
         """L of a pass: n ln(mean e^2) + sum ln s + prior."""
         if not passed.finite:
             return np.inf
         mean, sd = self.prior
+        columns = layout.columns
         with np.errstate(invalid="ignore"):
             pulls = ((point.p - mean) / sd)[columns]
         pull = float((pulls[np.isfinite(sd[columns])] ** 2).sum())
@@ -233,37 +341,21 @@ class Problem:
         floor = float(np.min((QUIETEST * spans(self.record)) ** 2 / self.R))
         return min(max(floor, 1e-12), 1.0)
 
-    def pack(self, point: Point, columns: Index) -> Array:
+    def pack(self, point: Point, layout: Layout) -> Array:
         """Theta of a point."""
-        return np.concatenate([point.x0[:, self.free_x0].ravel(), point.p[columns]])
+        return np.concatenate([point.x0[:, layout.states[layout.free]].ravel(), point.p[layout.columns]])
 
-    def unpack(self, theta: Array, point: Point, columns: Index) -> Point:
+    def unpack(self, theta: Array, point: Point, layout: Layout) -> Point:
         """The point with theta in place, within bounds."""
-        runs, free = len(point.x0), int(self.free_x0.sum())
+        runs, free = len(point.x0), len(layout.free)
         x0, p = point.x0.copy(), point.p.copy()
-        x0[:, self.free_x0] = theta[: runs * free].reshape(runs, free)
+        x0[:, layout.states[layout.free]] = theta[: runs * free].reshape(runs, free)
         low, high = self.limits
-        p[columns] = np.clip(theta[runs * free :], low[columns], high[columns])
+        p[layout.columns] = np.clip(theta[runs * free :], low[layout.columns], high[layout.columns])
         return Point(x0, p)
 
-    def on(self, record: Record, start: Point, R: Array | None = None) -> Problem:
-        """The same hypotheses beside another record."""
-        return replace(self, record=record, start=start, R=self.R if R is None else R)
-
-
-def check_record(model: Model, record: Record) -> None:
-    """Raise DataError where a record cannot be used with a model."""
-    if record.y.shape[1] != len(model.outputs) or record.u.shape[1] != len(model.inputs):
-        raise DataError(
-            f"{record.source}: expected {len(model.outputs)} outputs and {len(model.inputs)} inputs as in the model, "
-            f"got {record.y.shape[1]} and {record.u.shape[1]}; read it with this model"
-        )
-    unknown = sum(p.prior_sd > 0 for p in model.parameters.values())
-    open_states = [s for s in model.states if s not in model.initial or model.initial[s].estimate]
-    first = len(open_states) * len(record.starts)
-    count = int((~np.isnan(record.y)).sum())
-    if count < unknown + first + 2:
-        raise DataError(
-            f"{record.source}: {count} measurements cannot determine {unknown} parameters and {first} initial states; "
-            "add data or fix parameters"
-        )
+    def on(self, record: Record, start: Point, **changes: object) -> Problem:
+        """The same hypotheses beside another record; nothing is compiled again."""
+        other = replace(self, record=record, start=start, **changes)  # type: ignore[arg-type]
+        other.__dict__["program"] = self.program
+        return other

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
-from suite.discovery.engine import Index, Pass, Point, Problem, check_record
-from suite.discovery.library import Term
-from suite.discovery.noise import noise_variance, unrolled
+from suite.discovery.engine import Index, Layout, Pass, Point, Problem
+from suite.discovery.noise import noise_variance
+from suite.discovery.starts import brought, check_record, first_states, pace_of, rough_path, start_of
+from suite.discovery.terms import Term
 from suite.model import Model
 from suite.record import Record
 
@@ -43,7 +43,12 @@ class Hypothesis:
 
     active: tuple[int, ...]
     levels: tuple[Level, ...]
-    columns: Index
+    layout: Layout
+
+    @property
+    def columns(self) -> Index:
+        """Indices of the parameters that moved."""
+        return self.layout.columns
 
     @property
     def exact(self) -> Level:
@@ -68,14 +73,15 @@ def levenberg_marquardt(
 
     Columns are scaled to one; a parameter at its bound whose gradient points outwards rests.
     """
-    columns = problem.columns(active)
-    passed = problem.run(point, q, active, columns)
-    L = problem.cost(passed, point, columns)
+    layout = problem.layout(active)
+    columns = layout.columns
+    passed = problem.run(point, q, layout)
+    L = problem.cost(passed, point, layout)
     damping = 1e-3
     mean, sd = problem.prior
     known = np.isfinite(sd[columns])
     low, high = problem.limits
-    edge = problem.free_x0.sum() * len(point.x0)
+    edge = len(layout.free) * len(point.x0)
     for _ in range(rounds):
         if not passed.finite:
             break
@@ -92,7 +98,7 @@ def levenberg_marquardt(
         scale = np.sqrt(np.maximum(np.diag(A), 1e-300))
         moving &= np.isfinite(scale) & (np.diag(A) > 1e-280)
         improved = False
-        theta = problem.pack(point, columns)
+        theta = problem.pack(point, layout)
         for _attempt in range(8):
             index = np.flatnonzero(moving)
             scaled = A[np.ix_(index, index)] / np.outer(scale[index], scale[index])
@@ -107,9 +113,9 @@ def levenberg_marquardt(
                 break
             trial = theta.copy()
             trial[index] += whole
-            there = problem.unpack(trial, point, columns)
-            tried = problem.run(there, q, active, columns)
-            cost = problem.cost(tried, there, columns)
+            there = problem.unpack(trial, point, layout)
+            tried = problem.run(there, q, layout)
+            cost = problem.cost(tried, there, layout)
             if cost < L:
                 improved = True
                 drop = L - cost
@@ -136,7 +142,7 @@ def homotopy(
         levels.append(level)
         if np.isfinite(level.L):
             point = level.point
-    return Hypothesis(tuple(active), tuple(levels), problem.columns(active))
+    return Hypothesis(tuple(active), tuple(levels), problem.layout(active))
 
 
 def polish(problem: Problem, hypothesis: Hypothesis) -> Hypothesis:
@@ -166,20 +172,23 @@ def prepare(model: Model, record: Record, terms: tuple[Term, ...] = ()) -> Probl
     """The problem of a model beside a record: noise, a start for the initial states, weights of the process noise."""
     check_record(model, record)
     R = noise_variance(model, record)
-    x0, free = _first_states(model, record)
+    x0, free = first_states(model, record)
     problem = Problem(model, record, (), R, Point(x0, model.values), free, np.zeros(len(model.states)))
     # The path decides the weights, the weights the path: two rounds settle it.
-    path = _rough_path(problem)
+    path = rough_path(problem)
     for _ in range(2):
-        problem = replace(problem, weights=_pace(model, record, path), path=path)
+        problem = replace(problem, weights=pace_of(model, record, path), path=path)
         level = levenberg_marquardt(problem, problem.start, LEVELS[0], (), 4, 1.0)
         if level.passed.finite:
             path = level.passed.X
             x0 = level.point.x0
-    problem = replace(problem, path=path, weights=_pace(model, record, path), start=Point(x0, model.values))
+    problem = replace(problem, path=path, weights=pace_of(model, record, path), start=Point(x0, model.values))
     full = replace(problem, substeps=_substeps(problem), terms=terms)
-    p = np.concatenate([model.values, *(_start(full, term) for term in terms)])
-    return replace(full, start=Point(x0, p))
+    p = np.concatenate([model.values, *(start_of(full, term) for term in terms)])
+    start = Point(np.hstack([x0, np.zeros((len(x0), sum(len(term.states) for term in terms)))]), p)
+    for k in range(len(terms)):
+        start = brought(full, start, k)
+    return replace(full, start=start)
 
 
 def _substeps(problem: Problem) -> int:
@@ -192,73 +201,6 @@ def _substeps(problem: Problem) -> int:
         before, moved = moved, float(np.max(np.abs(finer.Y - last.Y) / problem.R**0.5)) if finer.finite else np.inf
         last, count = finer, 2 * count
     return 1 if moved > 0.25 * before or not np.isfinite(moved) else max(count // 2, 1)
-
-
-def _start(problem: Problem, term: Term) -> Array:
-    """A candidate's parameters before it is fitted: coefficients zero, inner scales in the middle of their range."""
-    inner = [term.scale(name, problem.spread, problem.length) * entry.start for name, entry in term.inner.items()]
-    return np.array([0.0] * len(term.coefficients) + inner)
-
-
-def _first_states(model: Model, record: Record) -> tuple[Array, npt.NDArray[np.bool_]]:
-    """A start for each run's first state, (runs, n), and which of its components are estimated, (n,)."""
-    names = list(model.states)
-    x0 = np.zeros((len(record.starts), len(names)))
-    free = np.ones(len(names), dtype=bool)
-    measured = {output.equation.strip(): j for j, output in enumerate(model.outputs.values())}
-    for i, name in enumerate(names):
-        given = model.initial.get(name)
-        if given is not None:
-            x0[:, i] = given.value
-            free[i] = given.estimate
-            continue
-        position = next((p for p in model.definitions if model.states[p].strip() == name), None)
-        for r, run in enumerate(record.runs):
-            own = measured.get(name, measured.get(position or ""))
-            if own is None:
-                continue
-            y = unrolled(run, own, list(model.outputs.values())[own].angle)
-            there = ~np.isnan(y)
-            t, y = run.t[there][:6], y[there][:6]
-            if name in measured:
-                x0[r, i] = y[0] if len(y) else 0.0
-            elif len(y) > 1:
-                x0[r, i] = np.polyfit(t - t[0], y, 1)[0]
-    return x0, free
-
-
-def _rough_path(problem: Problem) -> Array:
-    """States at the samples before anything is fitted: measured where they are, integrated elsewhere."""
-    model, record = problem.model, problem.record
-    path = problem.run(problem.start, 0.0).X.copy()
-    for i, name in enumerate(model.states):
-        for j, output in enumerate(model.outputs.values()):
-            if output.equation.strip() == name:
-                path[:, i] = np.concatenate([unrolled(run, j, output.angle) for run in record.runs])
-    for i, name in enumerate(model.states):
-        position = next((p for p in model.definitions if model.states[p].strip() == name), None)
-        if position is not None and not np.isfinite(path[:, i]).all():
-            path[:, i] = np.gradient(path[:, list(model.states).index(position)], record.t)
-    return path
-
-
-def _pace(model: Model, record: Record, path: Array) -> Array:
-    """How fast each state moves along the path, its rate's standard deviation, (n,); zero for definitions."""
-    pace = np.zeros(len(model.states))
-    bounds = record.bounds
-    for i, name in enumerate(model.states):
-        if name not in model.suspects:
-            continue
-        slopes = []
-        for first, last in pairwise(bounds.tolist()):
-            good = np.isfinite(path[first:last, i])
-            if good.sum() > 2:
-                slopes.append(np.gradient(path[first:last, i][good], record.t[first:last][good]))
-        all_slopes = np.concatenate(slopes) if slopes else np.zeros(1)
-        pace[i] = float(np.sqrt(np.mean(all_slopes**2)))
-        if not np.isfinite(pace[i]) or pace[i] == 0.0:
-            pace[i] = 1.0 / max(float(record.t[-1] - record.t[0]), 1e-300)
-    return pace
 
 
 @dataclass(frozen=True, eq=False)

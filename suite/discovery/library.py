@@ -1,124 +1,110 @@
-"""From effects to candidates: which terms could be missing in this model, given the roles its states play.
+"""From effects to candidates: which terms could be missing in this model, given the roles its parts play.
 
 Roles are read off the equations. p' = v makes p a position and v its rate. A state whose rate depends on it only
 through (x - A), A a parameter or an input, deviates from the level A. A state is a temperature if its name or the
-unit of its level says so.
+unit of its level says so. Outputs, inputs, parameters and the clock have the effects that act in them.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 
-import numpy as np
-import numpy.typing as npt
 import sympy
 
 from suite import expressions
-from suite.effect import Effect, Inner
-from suite.kernels import codegen
-from suite.model import Model, Parameter
-
-Array = npt.NDArray[np.float64]
+from suite.discovery.terms import Place, Term
+from suite.effect import Effect
+from suite.model import Model
 
 CELSIUS = ("c", "degc", "celsius", "°c")
 KELVIN = ("k", "kelvin")
-
-
-@dataclass(frozen=True)
-class Term:
-    """A candidate: one effect in one equation of one model.
-
-    `text` is the term in the model's names; `coefficients` and `inner` are new parameter names; `variable` is the
-    state (or time) that it is a function of, for a picture.
-    """
-
-    effect: Effect
-    equation: str
-    text: str
-    coefficients: tuple[str, ...]
-    inner: Mapping[str, Inner]
-    variable: str
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """All new parameters, coefficients first."""
-        return (*self.coefficients, *self.inner)
-
-    @property
-    def key(self) -> tuple[str, str, str]:
-        """What makes two candidates the same."""
-        return (self.effect.id, self.equation, self.text)
-
-    def scale(self, name: str, spread: Mapping[str, float], length: float) -> float:
-        """The unit in which an inner scale's range is given: the visited range, a frequency, or one."""
-        match self.inner[name].of:
-            case "spread":
-                return spread.get(self.variable, 1.0)
-            case "frequency":
-                return 2.0 * np.pi / length
-            case _:
-                return 1.0
+SPEED = re.compile(r"(v|vx|vy|vz|w|omega|speed)\d*\Z")  # names of speeds whose position is no state
+ANGLE = re.compile(r"(th|theta|phi|psi|alpha|beta|gamma|angle)\d*\Z")
+# Roles of everything that is no state; they say where the effect acts.
+ELSEWHERE: Mapping[str, Place] = {
+    "output": "output", "input": "input", "parameter": "parameter", "fixed": "parameter", "clock": "clock",
+}  # fmt: skip
 
 
 def candidates(model: Model, effects: Mapping[str, Effect], absolute: bool = False) -> tuple[Term, ...]:
-    """Every effect in every suspect equation where its roles are played.
+    """Every effect wherever its roles are played: in the suspect equations, and in measurements, inputs, parameters.
 
     The model's symmetries are kept: where no equation depends on a state's absolute value (height in free fall), no
-    candidate may either, unless `absolute`.
+    candidate of a rate may either, unless `absolute`. Of two candidates of the same shape in one equation the first
+    stays, physics before a generic stand-in.
     """
     used = set().union(*(rate.free_symbols for rate in model.rates))
-    hidden = set() if absolute else {s for s in model.states if expressions.symbol(s) not in used}
-    names = _Names(model)
+    hidden = set() if absolute else {expressions.symbol(s) for s in model.states} - used
+    names = Names(model)
     found: dict[tuple[str, sympy.Expr], Term] = {}
     for equation in model.suspects:
-        own: list[Term] = []
         level = _level(model, equation)
-        for effect in effects.values():
-            own += _bind(model, effect, equation, level, names)
+        own = [term for effect in effects.values() for term in _in_rate(model, effect, equation, level, names)]
         for term in sorted(own, key=lambda term: term.effect.generic):
-            shape = expressions.parse(term.text, names.all | set(term.names), f"effect {term.effect.id}")
-            if any(expressions.symbol(s) in shape.free_symbols for s in hidden):
-                continue
-            # The first of two terms of the same shape stays: physics before a generic stand-in.
-            generic = shape.subs({expressions.symbol(n): sympy.Symbol(f"c{i}") for i, n in enumerate(term.names)})
-            found.setdefault((equation, generic if _positive(generic) else -generic), term)
-    return tuple(found.values())
+            shape = _shape(term, names)
+            texts = [term.text, *(z[0] for z in term.states.values())]
+            if not {s.name for s in hidden} & set().union(*map(_words, texts)):
+                found.setdefault((equation, shape if _positive(shape) else -shape), term)
+    elsewhere = [term for effect in effects.values() for term in _elsewhere(model, effect, names)]
+    return (*found.values(), *elsewhere)
+
+
+def _shape(term: Term, names: Names) -> sympy.Expr:
+    """The term with its parameters numbered, so that equal shapes are equal; states that it brings belong to it."""
+    own = set(term.names) | set(term.states)
+    shape = expressions.parse(term.text, names.all | own, f"effect {term.effect.id}")
+    numbered = {expressions.symbol(name): sympy.Symbol(f"c{i}") for i, name in enumerate(term.names)}
+    brought = {expressions.symbol(z): sympy.Symbol(f"{term.effect.id}_{z}") for z in term.states}
+    return shape.subs(numbered | brought)
 
 
 def _positive(shape: sympy.Expr) -> bool:
     return not shape.could_extract_minus_sign()
 
 
-class _Names:
-    """New parameter names that collide with nothing in the model."""
+@dataclass(frozen=True)
+class Names:
+    """Names that collide with nothing in a model."""
 
-    def __init__(self, model: Model) -> None:
-        self.all = frozenset(model.states) | frozenset(model.parameters) | frozenset(model.inputs)
-        self.taken = set(self.all)
+    model: Model
+    all: frozenset[str] = field(init=False)
+
+    def __post_init__(self) -> None:
+        model = self.model
+        object.__setattr__(self, "all", frozenset(model.states) | set(model.parameters) | set(model.inputs))
 
     def fresh(self, wanted: str) -> str:
         """`wanted`, or with the first free number behind it."""
-        if wanted not in self.all and wanted not in expressions.RESERVED:
+        taken = self.all | expressions.RESERVED
+        if wanted not in taken:
             return wanted
         number = 1
-        while f"{wanted}_{number}" in self.all:
+        while f"{wanted}_{number}" in taken:
             number += 1
         return f"{wanted}_{number}"
 
 
-def _bind(model: Model, effect: Effect, equation: str, level: str | None, names: _Names) -> Iterator[Term]:
+def _in_rate(model: Model, effect: Effect, equation: str, level: str | None, names: Names) -> Iterator[Term]:
     """The effect with its role letters replaced by the states that play them in this equation."""
     position = next((p for p in model.definitions if model.states[p].strip() == equation), None)
     wanted = set(effect.roles.values())
-    mechanical = position is not None
-    if wanted & {"position", "rate"} and not mechanical:
+    if wanted & set(ELSEWHERE):
         return
-    if "state" in wanted and mechanical:
+    mechanical = position is not None
+    if wanted & {"position", "angle"} and not mechanical:
+        return
+    if "rate" in wanted and not (mechanical or SPEED.match(equation)):
+        return
+    if "angle" in wanted and not _is_angle(model, position or ""):
+        return
+    if wanted & {"state", "content"} and mechanical:
         return
     deviation = f"({equation} - {level})" if level else equation
     kelvin = _kelvin(model, equation, level)
+    if "content" in wanted and kelvin is not None:
+        return
     if wanted & {"temperature", "level"} and (kelvin is None or ("level" in wanted and level is None)):
         return
     offset = f" + {kelvin:g}" if kelvin else ""
@@ -129,8 +115,10 @@ def _bind(model: Model, effect: Effect, equation: str, level: str | None, names:
     for other in others:
         filled = {
             "position": position or "",
+            "angle": position or "",
             "rate": equation,
             "state": equation,
+            "content": equation,
             "any": equation,
             "other": other,
             "deviation": deviation,
@@ -138,21 +126,77 @@ def _bind(model: Model, effect: Effect, equation: str, level: str | None, names:
             "level": f"({level}{offset})",
         }
         letters = {letter: filled[role] for letter, role in effect.roles.items()}
-        fresh = {name: names.fresh(name) for name in (*effect.coefficients, *effect.inner)}
-        text = re.sub(r"abs\(\(([^()]*)\)\)", r"abs(\1)", _renamed(effect.term, letters | fresh))
-        yield Term(
-            effect,
-            equation,
-            text,
-            tuple(fresh[name] for name in effect.coefficients),
-            {fresh[name]: inner for name, inner in effect.inner.items()},
-            other or (position if "position" in wanted and position else equation),
-        )
+        variable = other or (position if wanted & {"position", "angle"} and position else equation)
+        for form in (effect.term, *effect.forms):
+            yield _bound(effect, form, "rate", equation, "", letters, variable, names)
 
 
-def _renamed(text: str, names: Mapping[str, str]) -> str:
-    """The term with its names replaced."""
+def _elsewhere(model: Model, effect: Effect, names: Names) -> Iterator[Term]:
+    """The effect in every measurement, input or parameter that it could act in, or in the clock."""
+    role, letter = next(((r, lt) for lt, r in effect.roles.items() if r in ELSEWHERE), ("", ""))
+    forms = (effect.term, *effect.forms)
+    if role == "output":
+        for name, output in model.outputs.items():
+            letters = {letter: f"({output.equation})"}
+            for form in forms if not (output.angle and letter in _words(effect.term)) else ():
+                yield _bound(effect, form, "output", name, name, letters, name, names)
+    elif role == "input":
+        for name, entry in model.inputs.items():
+            if entry.delay is None or not set(effect.roles.values()) & {"late", "held"}:
+                letters = {letter: name}
+                letters |= {lt: f"{name}__{r}" for lt, r in effect.roles.items() if r in ("late", "held")}
+                for form in forms:
+                    yield _bound(effect, form, "input", name, name, letters, name, names)
+    elif role in ("parameter", "fixed"):
+        for name, parameter in model.parameters.items():
+            where = _stands_in(model, name)
+            if where and parameter.value != 0 and (role == "parameter" or parameter.fixed):
+                for form in forms:
+                    yield _bound(effect, form, "parameter", where, name, {letter: name}, name, names)
+    elif role == "clock":
+        for form in forms:
+            yield _bound(effect, form, "clock", "t", "t", {letter: "1"}, "t", names)
+
+
+def _stands_in(model: Model, name: str) -> str | None:
+    """The first suspect equation, else the first output, that the parameter stands in."""
+    s = expressions.symbol(name)
+    order = list(model.states)
+    rates = [e for e in model.suspects if s in model.rates[order.index(e)].free_symbols]
+    outputs = [o for o, e in zip(model.outputs, model.output_expressions, strict=True) if s in e.free_symbols]
+    return next(iter([*rates, *outputs]), None)
+
+
+def _bound(
+    effect: Effect, form: str, place: Place, equation: str, symbol: str, letters: Mapping[str, str], variable: str,
+    names: Names,
+) -> Term:  # fmt: skip
+    """A candidate: the effect's text with its letters replaced, its parameters and states under names of their own."""
+    fresh = {name: names.fresh(name) for name in (*effect.coefficients, *effect.inner, *effect.states)}
+
+    def written(text: str) -> str:
+        return re.sub(r"abs\(\(([^()]*)\)\)", r"abs(\1)", renamed(text, letters | fresh))
+
+    return Term(
+        effect,
+        equation,
+        written(form),
+        tuple(fresh[name] for name in effect.coefficients),
+        {fresh[name]: inner for name, inner in effect.inner.items()},
+        variable,
+        place,
+        symbol,
+        {fresh[name]: (written(z.rate), written(z.start), z.free) for name, z in effect.states.items()},
+    )
+
+
+def renamed(text: str, names: Mapping[str, str]) -> str:
+    """The text with its names replaced."""
     return re.sub(r"[A-Za-z_]\w*", lambda match: names.get(match.group(), match.group()), text)
+
+
+def _words(text: str) -> set[str]:
+    return set(re.findall(r"[A-Za-z_]\w*", text))
 
 
 def _level(model: Model, equation: str) -> str | None:
@@ -169,6 +213,15 @@ def _level(model: Model, equation: str) -> str | None:
     return None
 
 
+def _is_angle(model: Model, state: str) -> bool:
+    """Whether a position is an angle: by its unit, by its output, or by its name."""
+    unit = model.units.get(state)
+    if unit is not None:
+        return unit.strip().lower() in ("rad", "radian", "radians")
+    turning = any(output.angle and output.equation.strip() == state for output in model.outputs.values())
+    return turning or bool(ANGLE.match(state))
+
+
 def _kelvin(model: Model, equation: str, level: str | None) -> float | None:
     """What to add for kelvin if this state is a temperature (0 or 273.15), None if it is none.
 
@@ -177,6 +230,7 @@ def _kelvin(model: Model, equation: str, level: str | None) -> float | None:
     """
     parameter = model.parameters.get(level) if level else None
     unit = (parameter.unit or "").strip().lower() if parameter else ""
+    unit = unit or model.units.get(equation, "").strip().lower()
     if unit in CELSIUS:
         return 273.15
     if unit in KELVIN:
@@ -187,29 +241,16 @@ def _kelvin(model: Model, equation: str, level: str | None) -> float | None:
     return 0.0 if value > 200 else 273.15
 
 
-def grown(model: Model, terms: Sequence[Term], numbers: Sequence[Mapping[str, Parameter]]) -> Model:
-    """The model with the terms added, their parameters as in `numbers` under names that are not taken."""
-    for term, at in zip(terms, numbers, strict=True):
-        names = _Names(model)
-        renamed = {name: names.fresh(name) for name in term.names}
-        text = _renamed(term.text, renamed)
-        model = model.plus(term.equation, text, {renamed[name]: at[name] for name in term.names})
-    return model
+def triage(term: Term) -> bool:
+    """Whether a candidate acts outside the equations of motion: in a sensor, an input, a number or the clock."""
+    return term.place != "rate"
 
 
-def gates(model: Model, terms: tuple[Term, ...]) -> tuple[tuple[str, ...], tuple[codegen.Gate, ...]]:
-    """The parameters and gated terms that extend the model's program by all candidates.
-
-    Each candidate's parameters get names of their own: <number>__<name>.
+def incompatible(first: Term, second: Term) -> bool:
+    """Whether two candidates may not stand together: a gain of an input beside one of a sensor scales the same thing,
+    and an input, a parameter or a sensor is changed once.
     """
-    names: list[str] = []
-    built = []
-    order = list(model.states)
-    declared = set(model.states) | set(model.parameters) | set(model.inputs)
-    for k, term in enumerate(terms):
-        own = {name: f"c{k}__{name}" for name in term.names}
-        text = _renamed(term.text, own)
-        expression = expressions.parse(text, declared | set(own.values()), f"effect {term.effect.id}")
-        names += own.values()
-        built.append(codegen.Gate(rates={order.index(term.equation): expression}))
-    return tuple(names), tuple(built)
+    places = {first.place, second.place}
+    scales = {first.effect.id, second.effect.id}
+    same = first.place == second.place and triage(first) and first.symbol == second.symbol
+    return same or (places == {"input", "output"} and scales <= {"missing_input_gain", "sensor_scale"})

@@ -133,7 +133,7 @@ def discrepancy(problem: Problem, point: Point) -> Discrepancy:
         Q = np.concatenate([np.zeros(n), level * pace**2 / step])
         results: list[tuple[Record, Filtered]] = []
         for r, run in enumerate(problem.record.runs):
-            x0 = np.concatenate([point.x0[r], np.zeros(extra)])
+            x0 = np.concatenate([point.x0[r, :n], np.zeros(extra)])
             reach = np.maximum(np.ptp(problem.path, axis=0), 1e-300)
             P0 = np.diag(np.concatenate([free * (0.1 * reach) ** 2, pace**2]))
             results.append((run, filtered(wide, run, x0, P0, Q, problem.R * min(noise, 1.0))))

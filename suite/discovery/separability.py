@@ -32,10 +32,8 @@ def distance(problem: Problem, winner: Hypothesis, rival: Hypothesis, known: Seq
             p[j] = winner.exact.point.p[j]
     start = Point(problem.start.x0, np.concatenate([winner.exact.point.p[:count], problem.start.p[count:]]))
     scale = max(float(np.mean(winner.exact.passed.e**2)), 1e-12)
-    clean = replace(
-        problem, model=replace(model, parameters=fixed), record=replace(problem.record, y=Y), start=start, scale=scale
-    )
-    clean.__dict__["program"] = problem.program  # the same equations: nothing to compile again
+    known_model = replace(model, parameters=fixed)
+    clean = problem.on(replace(problem.record, y=Y), start, model=known_model, scale=scale)
     level = levenberg_marquardt(clean, Point(rival.exact.point.x0, p), 0.0, rival.active, 25, 1e-3)
     return float((level.passed.e**2).sum() / scale) if level.passed.finite else np.inf
 
@@ -74,7 +72,7 @@ def smallest_detectable(found: Search, named: Hypothesis) -> dict[str, float]:
     smallest = {}
     for entry in score(problem, named, skip=found.absorbed, exact=True):
         term = problem.terms[entry.k]
-        penalty = len(term.names) * np.log(problem.count) + 2.0 * np.log(library)
+        penalty = len(term.counted) * np.log(problem.count) + 2.0 * np.log(library)
         if entry.length > 0:
-            smallest[f"{term.effect.id}@{term.equation}"] = float((np.sqrt(penalty) + 1.645) / entry.length)
+            smallest[term.label] = float((np.sqrt(penalty) + 1.645) / entry.length)
     return smallest

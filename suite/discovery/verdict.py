@@ -14,8 +14,9 @@ from suite.discovery import misfit, separability, words
 from suite.discovery.engine import Point, Problem
 from suite.discovery.fit import Hypothesis, Level, covariance, homotopy, prepare, summarise
 from suite.discovery.identify import ALARM, Search, needs_more, search
-from suite.discovery.library import candidates, grown
+from suite.discovery.library import candidates
 from suite.discovery.result import Candidate, Coefficient, Kind, Named, Verdict
+from suite.discovery.terms import grown
 from suite.effect import Effect
 from suite.model import Model, Parameter
 from suite.record import Record
@@ -154,8 +155,9 @@ def describe(problem: Problem, hypothesis: Hypothesis) -> list[Named]:
         coefficients = {
             name: Coefficient(float(exact.point.p[j]), float(np.sqrt(max(V[place[j], place[j]], 0.0))))
             for name, j in zip(term.names, problem.places(k), strict=True)
+            if name in term.counted
         }
-        named.append(Named(term.effect.id, term.equation, term.text, coefficients))
+        named.append(Named(term.effect.id, term.equation, term.shown, coefficients))
     return named
 
 
@@ -179,24 +181,28 @@ def amended(problem: Problem, hypothesis: Hypothesis, fitted: bool = True) -> Mo
     numbers = [
         {name: Parameter(float(point.p[j]), free=True, bounds=(float(low[j]), float(high[j])))
          for name, j in zip(term.names, problem.places(k), strict=True)}
+        | {name: Parameter(float(point.x0[0, j])) for name, j in zip(term.states, problem.states(k), strict=True)}
         for k, term in zip(hypothesis.active, terms, strict=True)
     ]  # fmt: skip
     return grown(model, terms, numbers)
 
 
-def curve(problem: Problem, base: Hypothesis, hypothesis: Hypothesis, equation: str) -> Array:
-    """What the hypothesis adds to a rate of the calibrated base model along its own path, (N,)."""
+def curve(problem: Problem, base: Hypothesis, hypothesis: Hypothesis, equation: str) -> Array | None:
+    """What the hypothesis adds to a rate of the calibrated base model along its own path, (N,); None for an effect
+    outside the equations of motion.
+    """
+    if equation not in problem.model.states:
+        return None
     i = list(problem.model.states).index(equation)
     program, record = problem.program, problem.record
-    n, m = program.n, program.parameters
+    n, m = len(hypothesis.layout.states), program.parameters
     f, Fx, Fp = np.zeros(n), np.zeros((n, n)), np.zeros((n, m))
-    on, off = program.all_off(), program.all_off()
-    on[list(hypothesis.active)] = 1
     added = np.zeros(len(record))
+    u = problem.inputs(hypothesis.exact.point.p)
     for k, x in enumerate(hypothesis.exact.passed.X):
-        program.rate(record.t[k], x, record.u[k], hypothesis.exact.point.p, on, f, Fx, Fp)
+        program.rate(record.t[k], x, u[k], hypothesis.exact.point.p, hypothesis.layout.on, f, Fx, Fp)
         added[k] = f[i]
-        program.rate(record.t[k], x, record.u[k], base.exact.point.p, off, f, Fx, Fp)
+        program.rate(record.t[k], x, u[k], base.exact.point.p, base.layout.on, f, Fx, Fp)
         added[k] -= f[i]
     return added
 
@@ -229,15 +235,13 @@ def held_out(problem: Problem, hypothesis: Hypothesis, parts: misfit.Split) -> d
     for k in hypothesis.active:
         p[problem.places(k)] = hypothesis.exact.point.p[problem.places(k)]
     x0 = hypothesis.exact.point.x0[:runs]
-    train = replace(problem, record=parts.train, start=Point(x0, problem.start.p))
-    train.__dict__["program"] = problem.program  # the same equations: nothing to compile again
+    train = problem.on(parts.train, Point(x0, problem.start.p))
     point = homotopy(train, Point(x0, p), hypothesis.active, first=0.1).exact.point
-    judged = replace(problem, record=parts.judged, frozen=True)
-    judged.__dict__["program"] = problem.program
+    judged = problem.on(parts.judged, problem.start, frozen=True)
     if parts.first == 0:
         start = Point(hypothesis.exact.point.x0[-1:], point.p)
         point = homotopy(judged, start, hypothesis.active, first=0.1).exact.point if problem.free_x0.any() else start
-    Y = judged.run(point, 0.0, hypothesis.active).Y
+    Y = judged.run(point, 0.0, judged.layout(hypothesis.active)).Y
     return misfit.rmse(parts.judged, Y, list(problem.model.outputs), slice(parts.first, None))
 
 

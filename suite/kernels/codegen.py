@@ -13,7 +13,7 @@ import linecache
 import os
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import ModuleType
@@ -31,14 +31,35 @@ from suite.kernels.cache import numba
 from suite.kernels.types import MODEL, MODEL_FUNCTION
 
 Array = npt.NDArray[np.float64]
+Expr = sympy.Expr
+
+
+class TamePower(sympy.Function):  # type: ignore[misc]
+    """x^w in a slope: zero where x is."""
+
+    is_real = True
+
+
+class TameLog(sympy.Function):  # type: ignore[misc]
+    """log x in a slope: zero where x is."""
+
+    is_real = True
+
 
 
 @dataclass(frozen=True)
 class Gate:
-    """A term that can be switched on: what it adds to rates and outputs (by index), its parameters among all."""
+    """A term that can be switched on: what it adds to rates and outputs (by index), and the states that it brings
+    along, by name with their rates. Its parameters are among all.
+    """
 
     rates: Mapping[int, sympy.Expr] = field(default_factory=dict)
     outputs: Mapping[int, sympy.Expr] = field(default_factory=dict)
+    states: Mapping[str, sympy.Expr] = field(default_factory=dict)
+
+    def through(self, change: Callable[[Expr], Expr]) -> Gate:
+        """The gate with every expression changed."""
+        return Gate(*({key: change(e) for key, e in part.items()} for part in (self.rates, self.outputs, self.states)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +69,10 @@ class Program:
     Both write their last three arguments. Shapes: x (n,), u (inputs,), p (parameters,), on (gates,), Fx (n, n),
     Fp (n, parameters), Hx (outputs, n), Hp (outputs, parameters). Columns of Fp and Hp that belong to a gate are
     written only while it is on.
+
+    on[k] is 0 while gate k is off, else 1; a gate that brings states along is switched on by the place of the first
+    of them in x, behind the program's own n, so that x holds the states of active gates only. What couples two gates'
+    states is never written: the caller's arrays start at zero.
     """
 
     n: int
@@ -120,8 +145,8 @@ def compile_program(
     source = "\n\n".join(
         [
             HEADER,
-            _function("rate", "dx, Fx, Fp", rates, [gate.rates for gate in gates], names),
-            _function("output", "y, Hx, Hp", outputs, [gate.outputs for gate in gates], names),
+            _function("rate", "dx, Fx, Fp", rates, [(gate.rates, gate.states) for gate in gates], names, moving=True),
+            _function("output", "y, Hx, Hp", outputs, [(gate.outputs, gate.states) for gate in gates], names),
         ]
     )
     module = _load(source)
@@ -134,7 +159,7 @@ import math
 
 from suite.kernels.types import MODEL_FUNCTION
 from suite.kernels.cache import compile_kernel
-from suite.kernels.steps import sign'''
+from suite.kernels.steps import sign, tame_log, tame_power'''
 
 
 class _Printer(PythonCodePrinter):  # type: ignore[misc]
@@ -146,6 +171,12 @@ class _Printer(PythonCodePrinter):  # type: ignore[misc]
 
     def _print_sign(self, expr: sympy.Expr) -> str:
         return f"sign({self._print(expr.args[0])})"
+
+    def _print_TamePower(self, expr: sympy.Expr) -> str:
+        return f"tame_power({self._print(expr.args[0])}, {self._print(expr.args[1])})"
+
+    def _print_TameLog(self, expr: sympy.Expr) -> str:
+        return f"tame_log({self._print(expr.args[0])})"
 
     def _print_Heaviside(self, expr: sympy.Expr) -> str:
         return f"(1.0 if {self._print(expr.args[0])} > 0.0 else 0.0)"
@@ -186,13 +217,18 @@ def _function(
     name: str,
     written: str,
     base: Sequence[sympy.Expr],
-    gated: Sequence[Mapping[int, sympy.Expr]],
+    gated: Sequence[tuple[Mapping[int, sympy.Expr], Mapping[str, sympy.Expr]]],
     names: tuple[tuple[str, ...], ...],
+    *,
+    moving: bool = False,
 ) -> str:
-    """The text of one function: its values, Jacobian by the state and Jacobian by the parameters."""
+    """The text of one function: its values, Jacobian by the state and Jacobian by the parameters.
+
+    `gated` holds each gate's additions and its states with their rates, which are written if `moving`.
+    """
     value, by_x, by_p = written.split(", ")
     X, U, P = ([symbol(s) for s in group] for group in names)
-    own = _owned(P, base, gated)
+    own = _owned(P, base, [[*terms.values(), *states.values()] for terms, states in gated])
     targets: dict[str, sympy.Expr] = {}
     for i, expression in enumerate(base):
         targets[f"{value}[{i}]"] = expression
@@ -201,9 +237,12 @@ def _function(
     groups = zip("xup", (X, U, P), strict=True)
     lines = [f"    s_{s} = {group}[{j}]" for group, part in groups for j, s in enumerate(part)]
     lines += _assignments(targets, "=", "    ")
-    for k, terms in enumerate(gated):
+    for k, (terms, states) in enumerate(gated):
         added: dict[str, sympy.Expr] = {}
         fresh: dict[str, sympy.Expr] = {}
+        # Where the gate's own states stand in x, and everything that it alone writes.
+        places = [f"on[{k}] + {j}" if j else f"on[{k}]" for j in range(len(states))]
+        brought = list(zip(map(symbol, states), places, strict=True))
         for i, expression in terms.items():
             added[f"{value}[{i}]"] = expression
             added |= {f"{by_x}[{i}, {j}]": _derivative(expression, s) for j, s in enumerate(X)}
@@ -211,22 +250,29 @@ def _function(
         for i in range(len(base)):
             part = terms.get(i, sympy.Integer(0))
             fresh |= {f"{by_p}[{i}, {j}]": _derivative(part, s) for j, s in enumerate(P) if own.get(s) == k}
+            fresh |= {f"{by_x}[{i}, {place}]": _derivative(part, z) for z, place in brought}
+        for place, rate in zip(places, states.values() if moving else (), strict=moving):
+            fresh[f"{value}[{place}]"] = rate
+            across = [*((s, str(j)) for j, s in enumerate(X)), *brought]
+            fresh |= {f"{by_x}[{place}, {j}]": _derivative(rate, s) for s, j in across}
+            fresh |= {f"{by_p}[{place}, {j}]": _derivative(rate, s) for j, s in enumerate(P) if rate.has(s)}
         added = {target: part for target, part in added.items() if part != 0}
         if added or fresh:
             lines.append(f"    if on[{k}] != 0:")
+            lines += [f"        s_{z} = x[{place}]" for z, place in brought]
             lines += _assignments(added, "+=", "        ") + _assignments(fresh, "=", "        ")
     head = f"@compile_kernel(MODEL_FUNCTION)\ndef {name}(t, x, u, p, on, {written}):"
     return "\n".join([head, *lines, "    return"])
 
 
 def _owned(
-    P: Sequence[sympy.Symbol], base: Sequence[sympy.Expr], gated: Sequence[Mapping[int, sympy.Expr]]
+    P: Sequence[sympy.Symbol], base: Sequence[sympy.Expr], gated: Sequence[Sequence[sympy.Expr]]
 ) -> dict[sympy.Symbol, int]:
     """Parameters that one gate alone uses, with that gate: their columns cost nothing while it is off."""
     in_base = set().union(*(expression.free_symbols for expression in base)) if base else set()
     users: dict[sympy.Basic, set[int]] = {}
     for k, terms in enumerate(gated):
-        for expression in terms.values():
+        for expression in terms:
             for s in expression.free_symbols:
                 users.setdefault(s, set()).add(k)
     return {s: next(iter(users[s])) for s in P if s not in in_base and len(users.get(s, ())) == 1}
@@ -237,8 +283,16 @@ def _derivative(expression: sympy.Expr, by: sympy.Symbol) -> sympy.Expr:
     if not expression.has(by):
         return sympy.Integer(0)
     slope: Any = sympy.diff(expression, by)
-    flat: sympy.Expr = slope.replace(sympy.DiracDelta, lambda *_: sympy.Integer(0))
-    return flat
+    slope = slope.replace(sympy.DiracDelta, lambda *_: sympy.Integer(0))
+    # Where sqrt(x) or |x|^w reaches zero its slope is infinite or 0 * inf; there it counts as zero. The expression
+    # itself is never changed, so that what is infinite stays so.
+    slope = slope.replace(
+        lambda e: e.is_Pow and (not e.exp.is_Integer or (e.exp < 0 and e.base.func is sympy.Abs))
+        and not expression.has(e),
+        lambda e: TamePower(e.base, e.exp),
+    )  # fmt: skip
+    tamed: sympy.Expr = slope.replace(lambda e: e.func is sympy.log and not expression.has(e), lambda e: TameLog(*e.args))
+    return tamed
 
 
 def _assignments(targets: Mapping[str, sympy.Expr], operator: str, indent: str) -> list[str]:

@@ -1,0 +1,250 @@
+"""Scores: how much each candidate would explain, all of them in a few passes.
+
+The score is a Lagrange-multiplier test: known parameters and initial states are projected out of the prediction error
+and of each candidate's column, LM_k = (b_k' r)^2 / (s^2 |b_k|^2). It chooses what is refitted; the refit decides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import combinations
+
+import numpy as np
+import numpy.typing as npt
+
+from suite.discovery.engine import Index, Pass, Point, Problem
+from suite.discovery.fit import Hypothesis, Level
+from suite.discovery.library import incompatible
+from suite.discovery.starts import brought
+from suite.discovery.terms import Term
+
+Array = npt.NDArray[np.float64]
+
+COLLINEAR = 1e-3  # a candidate whose column the parameters explain to this is that parameter
+
+
+def is_tone(term: Term) -> bool:
+    """Whether a candidate has a frequency of its own."""
+    return any(inner.of == "frequency" for inner in term.inner.values())
+
+
+@dataclass(frozen=True, eq=False)
+class Score:
+    """One candidate's score at its best level: LM, the parameters it suggests (coefficients, inner scales), the level,
+    and the length of its projected column in noise sds a unit of its coefficient: LM = (c length)^2.
+    """
+
+    k: int
+    LM: float
+    p: Array
+    q: float
+    length: float
+
+
+def score(problem: Problem, hypothesis: Hypothesis, skip: Iterable[int] = (), exact: bool = False) -> list[Score]:
+    """All candidates that are not active, best first: at the likeliest level and a decade either side, or at q = 0."""
+    left_out = {*skip, *hypothesis.active}
+    best: dict[int, Score] = {}
+    levels = [level for level in hypothesis.levels if np.isfinite(level.L)]
+    if not levels:
+        return []
+    at = min(range(len(levels)), key=lambda i: levels[i].L)
+    for level in [levels[-1]] if exact else levels[max(at - 1, 0) : at + 2]:
+        for entry in _scores_at(problem, hypothesis, level, left_out, exact or level is levels[at]):
+            if entry.k not in best or entry.LM > best[entry.k].LM:
+                best[entry.k] = entry
+    return sorted(best.values(), key=lambda entry: -entry.LM)
+
+
+def _scores_at(
+    problem: Problem, hypothesis: Hypothesis, level: Level, left_out: set[int], tones: bool
+) -> Iterable[Score]:
+    """The scores at one level, over the tries of the inner scales; tones over their frequencies."""
+    plain = [k for k, term in enumerate(problem.terms) if k not in left_out and not is_tone(term)]
+    most = max((len(i.tries) for k in plain for i in problem.terms[k].inner.values()), default=1)
+    for number in range(most):
+        chosen = plain if number == 0 else [k for k in plain if problem.terms[k].inner]
+        yield from _score_pass(problem, hypothesis, level, chosen, partial(_with_inner, problem, number))
+    repeating = [k for k, term in enumerate(problem.terms) if k not in left_out and is_tone(term)]
+    for omega in frequencies(problem) if tones and repeating else ():
+        yield from _score_pass(problem, hypothesis, level, repeating, partial(_at_frequency, float(omega)))
+
+
+def _at_frequency(omega: float, k: int) -> Array:
+    """A tone's one inner scale."""
+    return np.array([omega])
+
+
+def _with_inner(problem: Problem, number: int, k: int) -> Array:
+    """Candidate k's inner scales at the numbered multiple of their start, within their range."""
+    term = problem.terms[k]
+    places = problem.places(k)[len(term.coefficients) :]
+    low, high = problem.limits
+    values = []
+    for name, inner in term.inner.items():
+        zero, unit = problem.unit(term, name)
+        values.append(zero + inner.start * inner.tries[number % len(inner.tries)] * unit)
+    return np.clip(np.array(values), low[places], high[places])
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """One pass with candidates at coefficient zero: r (M + priors,) the projected error, b the projected column(s) of
+    each candidate, by its number, whole their squared lengths before, and the noise's variance in units of R.
+    """
+
+    p: Array
+    r: Array
+    b: Mapping[int, Array]
+    whole: Mapping[int, Array]
+    noise: float
+
+
+def _columns(
+    problem: Problem, hypothesis: Hypothesis, level: Level, chosen: Sequence[int], inner: Callable[[int], Array],
+    prior: bool = True,
+) -> Columns | None:  # fmt: skip
+    """The projected columns of the chosen candidates at a level; None where the pass leaves the finite numbers."""
+    p = level.point.p.copy()
+    places = {}
+    point = Point(level.point.x0, p)
+    for k in chosen:
+        own = problem.places(k)
+        places[k] = own[: len(problem.terms[k].coefficients)]
+        p[places[k]] = 0.0
+        p[own[len(places[k]) :]] = inner(k)
+        point = brought(problem, point, k)
+    own_columns = hypothesis.columns
+    columns = np.concatenate([own_columns, *(np.array(place, dtype=np.int64) for place in places.values())])
+    passed = problem.run(point, level.q, problem.layout(hypothesis.active, chosen, columns))
+    if not passed.finite:
+        return None
+    width = passed.J.shape[1] - (len(columns) - len(own_columns))
+    r, B, C = _projected(problem, passed, own_columns, width, prior)
+    b, whole, at = {}, {}, 0
+    for k in chosen:
+        part = slice(at, at + len(places[k]))
+        b[k], whole[k] = B[:, part], (C[:, part] ** 2).sum(axis=0)
+        at += len(places[k])
+    return Columns(p, r, b, whole, problem.noise(passed))
+
+
+def _score_pass(
+    problem: Problem, hypothesis: Hypothesis, level: Level, chosen: Sequence[int], inner: Callable[[int], Array]
+) -> Iterable[Score]:
+    found = _columns(problem, hypothesis, level, chosen, inner) if chosen else None
+    if found is None:
+        # One candidate may leave the finite numbers; the others must not suffer.
+        half = len(chosen) // 2
+        for part in (chosen[:half], chosen[half:]) if half else ():
+            yield from _score_pass(problem, hypothesis, level, part, inner)
+        return
+    for k in chosen:
+        solved = _solved(problem, found, (k,))
+        if solved is not None:
+            c, LM = solved
+            places = problem.places(k)
+            values = found.p[places]
+            values[: len(c)] = c
+            length = float(np.linalg.norm(found.b[k][:, 0]) / np.sqrt(found.noise))
+            yield Score(k, LM, values, level.q, length)
+
+
+def _solved(problem: Problem, found: Columns, members: Sequence[int]) -> tuple[Array, float] | None:
+    """Coefficients of the members together and what they would explain; None where a column vanishes."""
+    b = np.hstack([found.b[k] for k in members])
+    whole = np.concatenate([found.whole[k] for k in members])
+    gram = b.T @ b
+    norms = np.diag(gram)
+    if not np.isfinite(gram).all() or (norms <= 1e-16 * whole).any():
+        return None
+    scale = np.sqrt(norms)
+    c = -np.linalg.lstsq(gram / np.outer(scale, scale), b.T @ found.r / scale, rcond=1e-10)[0] / scale
+    lossy = np.concatenate([[bool(problem.terms[k].effect.sign)] * found.b[k].shape[1] for k in members])
+    c = np.where(lossy, np.maximum(c, 0.0), c)
+    return c, float(2.0 * (-(b.T @ found.r) @ c) - c @ gram @ c) / found.noise
+
+
+def pairs(problem: Problem, base: Hypothesis, scores: Sequence[Score], most: int) -> list[tuple[Score, Score]]:
+    """The pairs that would explain most together, whatever each does alone, at the base model's likeliest level."""
+    level = base.best
+    inner = {s.k: s.p[len(problem.terms[s.k].coefficients) :] for s in scores}
+    if not inner or not np.isfinite(level.L):
+        return []
+    found = _columns(problem, base, level, list(inner), lambda k: inner[k])
+    if found is None:
+        return []
+    ranked = []
+    price = np.log(problem.count)
+    for first, second in combinations(inner, 2):
+        one, other = problem.terms[first], problem.terms[second]
+        solved = None if incompatible(one, other) else _solved(problem, found, (first, second))
+        if solved is None or (np.abs(solved[0]) == 0).any():
+            continue
+        counted = len(one.counted) + len(other.counted)
+        ranked.append((solved[1] - price * counted, first, second, solved[0]))
+    ranked.sort(key=lambda entry: -entry[0])
+    return [
+        (_half(problem, found, first, c, 0, level.q), _half(problem, found, second, c, found.b[first].shape[1], level.q))
+        for _, first, second, c in ranked[:most]
+    ]
+
+
+def _half(problem: Problem, found: Columns, k: int, c: Array, at: int, q: float) -> Score:
+    """One member of a pair, as a start for its refit."""
+    count = found.b[k].shape[1]
+    values = found.p[problem.places(k)]
+    values[:count] = c[at : at + count]
+    return Score(k, 0.0, values, q, 0.0)
+
+
+def _projected(
+    problem: Problem, passed: Pass, own: Index, width: int, prior: bool = True
+) -> tuple[Array, Array, Array]:
+    """The error and the candidates' columns with initial states and parameters projected out (prior rows included).
+
+    Returns r (M + priors,), B (M + priors, candidates), and the candidates' columns before, (M, candidates).
+    """
+    A, C = passed.J[:, :width], passed.J[:, width:]
+    noise = problem.noise(passed)
+    sd = problem.prior[1][own]
+    rows = np.zeros((len(own), width))
+    informed = np.isfinite(sd) if prior else np.zeros(len(sd), dtype=bool)
+    rows[np.arange(len(own)), width - len(own) + np.arange(len(own))] = np.where(
+        informed, np.sqrt(noise) / np.where(informed, sd, 1.0), 0.0
+    )
+    A = np.vstack([A, rows])
+    norms = np.sqrt((A**2).sum(axis=0))
+    A = A[:, norms > 0] / norms[norms > 0]
+    U, singular, _ = np.linalg.svd(A, full_matrices=False)
+    U = U[:, singular > 1e-10 * singular[0]] if len(singular) else U
+    whole = np.vstack([np.column_stack([passed.e, C]), np.zeros((len(own), 1 + C.shape[1]))])
+    whole = whole - U @ (U.T @ whole)
+    return whole[:, 0], whole[:, 1:], C
+
+
+def absorbed(problem: Problem, base: Hypothesis) -> tuple[int, ...]:
+    """Candidates that are a parameter in disguise: the data columns of the parameters explain theirs."""
+    level = base.best if np.isfinite(base.best.L) else base.levels[0]
+    chosen = [k for k, term in enumerate(problem.terms) if len(term.coefficients) == 1]
+    start = problem.start.p
+    found = _columns(
+        problem, base, level, chosen,
+        lambda k: start[problem.places(k)[len(problem.terms[k].coefficients) :]], prior=False,
+    )  # fmt: skip
+    if found is None:
+        return ()
+    return tuple(
+        k for k in chosen
+        if found.whole[k][0] == 0 or np.linalg.norm(found.b[k]) < COLLINEAR * np.sqrt(found.whole[k][0])
+    )  # fmt: skip
+
+
+def frequencies(problem: Problem) -> Array:
+    """The independent frequencies of the record, up to half of Nyquist's and to 200 of them, (frequencies,)."""
+    step = float(np.median(problem.record.runs[0].dt))
+    lowest = 2.0 * np.pi / problem.length
+    count = int(min(0.5 * np.pi / step / lowest, 200))
+    return np.asarray(lowest * np.arange(1.0, max(count, 1) + 1.0))

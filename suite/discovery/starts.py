@@ -1,0 +1,126 @@
+"""Where a fit begins: the first states of every run, the path they lead along, and the states an effect brings."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+import sympy
+
+from suite import expressions
+from suite.discovery.engine import Point, Problem
+from suite.discovery.noise import unrolled
+from suite.discovery.terms import Term
+from suite.errors import DataError
+from suite.model import Model
+from suite.record import Record
+
+Array = npt.NDArray[np.float64]
+
+
+def check_record(model: Model, record: Record) -> None:
+    """Raise DataError where a record cannot be used with a model."""
+    if record.y.shape[1] != len(model.outputs) or record.u.shape[1] != len(model.inputs):
+        raise DataError(
+            f"{record.source}: expected {len(model.outputs)} outputs and {len(model.inputs)} inputs as in the model, "
+            f"got {record.y.shape[1]} and {record.u.shape[1]}; read it with this model"
+        )
+    unknown = sum(p.prior_sd > 0 for p in model.parameters.values())
+    open_states = [s for s in model.states if s not in model.initial or model.initial[s].estimate]
+    first = len(open_states) * len(record.starts)
+    count = int((~np.isnan(record.y)).sum())
+    if count < unknown + first + 2:
+        raise DataError(
+            f"{record.source}: {count} measurements cannot determine {unknown} parameters and {first} initial states; "
+            "add data or fix parameters"
+        )
+
+
+def first_states(model: Model, record: Record) -> tuple[Array, npt.NDArray[np.bool_]]:
+    """A start for each run's first state, (runs, n), and which of its components are estimated, (n,)."""
+    names = list(model.states)
+    x0 = np.zeros((len(record.starts), len(names)))
+    free = np.ones(len(names), dtype=bool)
+    measured = {output.equation.strip(): j for j, output in enumerate(model.outputs.values())}
+    for i, name in enumerate(names):
+        given = model.initial.get(name)
+        if given is not None:
+            x0[:, i] = given.value
+            free[i] = given.estimate
+            continue
+        position = next((p for p in model.definitions if model.states[p].strip() == name), None)
+        for r, run in enumerate(record.runs):
+            own = measured.get(name, measured.get(position or ""))
+            if own is None:
+                continue
+            y = unrolled(run, own, list(model.outputs.values())[own].angle)
+            there = ~np.isnan(y)
+            t, y = run.t[there][:6], y[there][:6]
+            if name in measured:
+                x0[r, i] = y[0] if len(y) else 0.0
+            elif len(y) > 1:
+                x0[r, i] = np.polyfit(t - t[0], y, 1)[0]
+    return x0, free
+
+
+def rough_path(problem: Problem) -> Array:
+    """States at the samples before anything is fitted: measured where they are, integrated elsewhere."""
+    model, record = problem.model, problem.record
+    path = problem.run(problem.start, 0.0).X.copy()
+    for i, name in enumerate(model.states):
+        for j, output in enumerate(model.outputs.values()):
+            if output.equation.strip() == name:
+                path[:, i] = np.concatenate([unrolled(run, j, output.angle) for run in record.runs])
+    for i, name in enumerate(model.states):
+        position = next((p for p in model.definitions if model.states[p].strip() == name), None)
+        if position is not None and not np.isfinite(path[:, i]).all():
+            path[:, i] = np.gradient(path[:, list(model.states).index(position)], record.t)
+    return path
+
+
+def pace_of(model: Model, record: Record, path: Array) -> Array:
+    """How fast each state moves along the path, its rate's standard deviation, (n,); zero for definitions."""
+    pace = np.zeros(len(model.states))
+    bounds = record.bounds
+    for i, name in enumerate(model.states):
+        if name not in model.suspects:
+            continue
+        slopes = []
+        for first, last in pairwise(bounds.tolist()):
+            good = np.isfinite(path[first:last, i])
+            if good.sum() > 2:
+                slopes.append(np.gradient(path[first:last, i][good], record.t[first:last][good]))
+        all_slopes = np.concatenate(slopes) if slopes else np.zeros(1)
+        pace[i] = float(np.sqrt(np.mean(all_slopes**2)))
+        if not np.isfinite(pace[i]) or pace[i] == 0.0:
+            pace[i] = 1.0 / max(float(record.t[-1] - record.t[0]), 1e-300)
+    return pace
+
+
+def start_of(problem: Problem, term: Term) -> Array:
+    """A candidate's parameters before it is fitted: coefficients zero, inner scales in the middle of their range."""
+    inner = []
+    for name, entry in term.inner.items():
+        zero, unit = problem.unit(term, name)
+        inner.append(zero + entry.start * unit)
+    return np.array([0.0] * len(term.coefficients) + inner)
+
+
+def brought(problem: Problem, point: Point, k: int) -> Point:
+    """The point with the first values of candidate k's states, from each run's first state, input and parameters."""
+    term = problem.terms[k]
+    if not term.states:
+        return point
+    model, record = problem.model, problem.record
+    names = [*model.states, *model.parameters, *model.inputs, *term.names, "t"]
+    x0 = point.x0.copy()
+    count = len(model.parameters)
+    for r, first in enumerate(record.starts):
+        values = [*x0[r, : len(model.states)], *point.p[:count], *record.u[first], *point.p[problem.places(k)],
+                  record.t[first]]  # fmt: skip
+        known = {expressions.symbol(name): float(value) for name, value in zip(names, values, strict=True)}
+        for place, (_, text, _) in zip(problem.states(k), term.states.values(), strict=True):
+            parsed: sympy.Expr = expressions.parse(text, set(names), f"effect {term.effect.id}")
+            x0[r, place] = float(parsed.subs(known))
+    return Point(x0, point.p)

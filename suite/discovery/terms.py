@@ -1,0 +1,168 @@
+"""A candidate as the engine sees it: where a term acts, what it brings along, and how a model grows by it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import sympy
+
+from suite import expressions
+from suite.effect import Effect, Inner
+from suite.kernels import codegen
+from suite.model import Initial, Model, Parameter
+
+Place = Literal["rate", "output", "input", "parameter", "clock"]
+CHANNELS = ("late", "slope", "tau", "held")  # what an input may look like besides its samples; see channels.py
+
+
+@dataclass(frozen=True)
+class Term:
+    """A candidate: one effect in one equation of one model.
+
+    `text` is the term in the model's names; `coefficients`, `inner` and `states` (rate, first value, whether that is
+    estimated) are new names; `variable` is what it is a function of, for a picture. `place` says what it is added to:
+    the rate or output `equation`, or the input or parameter `symbol` wherever that stands, or (clock) to every rate.
+    """
+
+    effect: Effect
+    equation: str
+    text: str
+    coefficients: tuple[str, ...]
+    inner: Mapping[str, Inner]
+    variable: str
+    place: Place = "rate"
+    symbol: str = ""
+    states: Mapping[str, tuple[str, str, bool]] = field(default_factory=dict)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All new parameters, coefficients first."""
+        return (*self.coefficients, *self.inner)
+
+    @property
+    def counted(self) -> tuple[str, ...]:
+        """The parameters that a fit moves: a pinned coefficient stays at 1."""
+        return tuple(self.inner) if self.effect.pinned else self.names
+
+    @property
+    def key(self) -> tuple[str, str, str]:
+        """What makes two candidates the same."""
+        return (self.effect.id, self.equation, self.text)
+
+    @property
+    def label(self) -> str:
+        """The effect with its equation: what the verdict's lists are keyed by."""
+        return f"{self.effect.id}@{self.equation}"
+
+    @property
+    def shown(self) -> str:
+        """The term as people read it."""
+        text = re.sub(r"([A-Za-z]\w*)__late", rf"\1(t - {self.coefficients[0]})", self.text)
+        text = re.sub(r"([A-Za-z]\w*)__held", r"held(\1)", text)
+        if self.effect.pinned:
+            text = re.sub(rf"\b{self.coefficients[0]}\*", "", text)
+        match self.place:
+            case "input" | "parameter":
+                return f"{self.symbol} -> {self.symbol} {text[0]} {text[1:]}"
+            case "clock":
+                return f"all rates times (1 {text[0]} {text[1:].removesuffix('*1')})"
+            case _:
+                return text
+
+
+def grown(model: Model, terms: Sequence[Term], numbers: Sequence[Mapping[str, Parameter]]) -> Model:
+    """The model with the terms added, their parameters and first values as in `numbers` under names that are free."""
+    for term, at in zip(terms, numbers, strict=True):
+        names = _free(model, [*term.names, *term.states])
+        kept = [n for n in term.names if n in term.counted]
+        parameters = {names[n]: at[n] for n in kept}
+        if re.search(r"__(late|held)\b", term.text):
+            entry = model.inputs[term.symbol]
+            held = "linear" if entry.hold == "previous" else "previous"
+            late = "__late" in term.text
+            model = model.with_input(
+                term.symbol, parameters, delay=names[kept[0]] if late else None, hold=entry.hold if late else held
+            )
+            continue
+        text = _one(term, _renamed(term.text, names))
+        states = {names[z]: _renamed(rate, names) for z, (rate, _, _) in term.states.items()}
+        initial = {names[z]: Initial(at[z].value, estimate=free) for z, (_, _, free) in term.states.items()}
+        target = term.equation if term.place in ("rate", "output") else term.symbol
+        model = model.plus(target, text, parameters, states, initial)
+    return model
+
+
+def _free(model: Model, wanted: Sequence[str]) -> dict[str, str]:
+    """Names that the model does not have yet, one for each that is wanted."""
+    taken = set(model.states) | set(model.parameters) | set(model.inputs) | set(expressions.RESERVED)
+    free = {}
+    for name in wanted:
+        stem, number = re.sub(r"_\d+\Z", "", name), 0
+        fresh = name if name not in taken else stem
+        while fresh in taken:
+            number += 1
+            fresh = f"{stem}_{number}"
+        taken.add(fresh)
+        free[name] = fresh
+    return free
+
+
+def _one(term: Term, text: str) -> str:
+    """The text with a pinned coefficient left out."""
+    return re.sub(rf"\b{term.coefficients[0]}\*", "", text) if term.effect.pinned else text
+
+
+def _renamed(text: str, names: Mapping[str, str]) -> str:
+    return re.sub(r"[A-Za-z_]\w*", lambda match: names.get(match.group(), match.group()), text)
+
+
+def gates(model: Model, terms: Sequence[Term]) -> tuple[tuple[str, ...], tuple[codegen.Gate, ...]]:
+    """The parameters and gated terms that extend the model's program by all candidates.
+
+    Each candidate's parameters and states get names of their own: c<number>__<name>.
+    """
+    names: list[str] = []
+    built = []
+    order = list(model.states)
+    channels = {f"{name}__{channel}" for name in model.inputs for channel in CHANNELS}
+    declared = set(model.states) | set(model.parameters) | set(model.inputs) | channels
+    for k, term in enumerate(terms):
+        own = {name: f"c{k}__{name}" for name in (*term.names, *term.states)}
+        known, where = declared | set(own.values()), f"effect {term.effect.id}"
+        added = expressions.parse(_renamed(term.text, own), known, where)
+        names += [own[name] for name in term.names]
+        if term.place == "input" and "__late" in term.text:
+            added = _late(added, term.symbol, own[term.coefficients[0]])
+        states = {own[z]: expressions.parse(_renamed(rate, own), known, where) for z, (rate, _, _) in
+                  term.states.items()}  # fmt: skip
+        rates: dict[int, sympy.Expr] = {}
+        outputs: dict[int, sympy.Expr] = {}
+        match term.place:
+            case "rate":
+                rates = {order.index(term.equation): added}
+            case "output":
+                outputs = {list(model.outputs).index(term.equation): added}
+            case "clock":
+                rates = {i: added * rate for i, rate in enumerate(model.rates)}
+            case _:
+                rates = _substituted(model.rates, term.symbol, added)
+                outputs = _substituted(model.output_expressions, term.symbol, added)
+        built.append(codegen.Gate(rates, outputs, states))
+    return tuple(names), tuple(built)
+
+
+def _substituted(equations: Sequence[sympy.Expr], name: str, added: sympy.Expr) -> dict[int, sympy.Expr]:
+    """What the equations gain when the named symbol becomes symbol + added, by index."""
+    s = expressions.symbol(name)
+    return {i: sympy.expand(e.subs(s, s + added) - e) for i, e in enumerate(equations) if e.has(s)}
+
+
+def _late(added: sympy.Expr, name: str, delay: str) -> sympy.Expr:
+    """With the delayed input linearised about the delay that its channels were made at: exact there, and so is its
+    derivative.
+    """
+    late, slope, tau = (expressions.symbol(f"{name}__{channel}") for channel in ("late", "slope", "tau"))
+    return added.subs(late, late - (expressions.symbol(delay) - tau) * slope)
