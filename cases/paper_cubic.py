@@ -20,4 +20,5 @@ CASE = Case(
     truth=PLANT,
     experiment=EXPERIMENT,
     missing=(Missing("cubic_stiffness", "x1", {"a3": 0.0195}),),
+    tags=("mechanical", "published"),
 )

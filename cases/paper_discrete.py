@@ -11,4 +11,5 @@ CASE = Case(
     experiment=EXPERIMENT,
     missing=(Missing("cubic_stiffness", "x1", {"a3": 0.0195}),),
     held=True,
+    tags=("mechanical", "published"),
 )

@@ -20,4 +20,5 @@ CASE = Case(
         Missing("linear_stiffness", "x1", {"a2": 1.0}),
         Missing("cubic_stiffness", "x1", {"a3": 0.0195}),
     ),
+    tags=("mechanical", "published"),
 )

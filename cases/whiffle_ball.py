@@ -2,36 +2,29 @@
 
 from pathlib import Path
 
+from cases._falling_ball import FREE_FALL, drops, source
 from suite.case import Case
-from suite.measured import Source, read_runs
-from suite.model import Initial, Model, Output, Parameter
 from suite.record import Record
 
-SOURCE = Source(
-    folder="ball_drops",
-    origin="github.com/briandesilva/discovery-of-physics-from-data, data/Ball_drops_data.xls, a CSV file a drop",
-    sha256={
-        "whiffle_ball_1_drop1.csv": "11abd9df6a74d2e9b4c9800d7adbb7187d5af20858ec0536b34125ea14f04398",
-        "whiffle_ball_1_drop2.csv": "c9f8dd0fa7ef5419a84702e5ba1bd3867b0675c43d9b5a3d85220d76e9a12e19",
-    },
+SOURCE = source(
+    "whiffle_ball_1",
+    (
+        "11abd9df6a74d2e9b4c9800d7adbb7187d5af20858ec0536b34125ea14f04398",
+        "c9f8dd0fa7ef5419a84702e5ba1bd3867b0675c43d9b5a3d85220d76e9a12e19",
+    ),
 )
 
 
 def measured(folder: Path | None) -> Record:
-    """Two runs: t in seconds, y (N, 1) the height in m."""
-    return read_runs(SOURCE, folder, "t", ["height"])
+    """Both drops, so that the whole story can be told from one record; the last of several runs is held out anyway."""
+    return drops(SOURCE, folder)
 
 
 CASE = Case(
     name="whiffle-ball",
     sentence="Two drops of a whiffle ball against free fall; the air's drag is missing.",
-    deficient=Model(
-        name="free fall",
-        states={"z": "v", "v": "-g"},
-        parameters={"g": Parameter(9.81, fixed=True, unit="m/s^2")},
-        outputs={"z": Output("z", column="height")},
-        initial={"z": Initial(47.0, estimate=True), "v": Initial(0.0, estimate=True)},
-    ),
+    deficient=FREE_FALL,
     measured=measured,
     noises=(0.0,),
+    tags=("measured", "mechanical"),
 )

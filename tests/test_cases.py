@@ -11,11 +11,18 @@ import pytest
 import cases
 from cases.whiffle_ball import SOURCE
 from suite import plugins
+from suite.case import Case, Experiment
 from suite.errors import DataError
-from suite.model import Parameter
+from suite.model import Model, Output, Parameter
+from suite.record import Record
 
 FILES = sorted(Path(cases.__path__[0]).glob("[!_]*.py"))
-SIMULATED = [name for name, case in plugins.cases().items() if case.truth is not None]
+WITH_TRUTH = [name for name, case in plugins.cases().items() if case.truth is not None]
+# Tens of states compile for minutes; their equations are compared as text.
+LARGE = [name for name in WITH_TRUTH if "large" in plugins.cases()[name].tags]
+SIMULATED = [name for name in WITH_TRUTH if name not in LARGE]
+NULL = [name for name in SIMULATED if "null" in plugins.cases()[name].tags]
+LACKING = [name for name in SIMULATED if name not in NULL]
 MEASURED = [name for name, case in plugins.cases().items() if case.measured is not None]
 
 
@@ -53,21 +60,100 @@ def test_the_seed_fixes_every_number(name: str) -> None:
     other, same = case.simulate(0.05, 8)
     np.testing.assert_array_equal(first.y, again.y)
     np.testing.assert_array_equal(truth.x, same.x)
-    assert np.all(np.std(first.y - other.y, axis=0) > 0)
+    assert np.all(np.nanstd(first.y - other.y, axis=0) > 0)
 
 
-@pytest.mark.parametrize("name", SIMULATED)
+@pytest.mark.parametrize("name", LACKING)
 def test_the_model_error_is_the_missing_terms(name: str) -> None:
     """True rate = deficient rate + d, and d acts only where the case says that something is missing."""
     case = plugins.cases()[name]
     assert case.truth is not None
     record, truth = case.simulate(0.0, 0)
-    for k in range(0, len(record), 40):
-        gap = case.truth.rate(record.t[k], truth.x[k], record.u[k]) - truth.d[k]
-        np.testing.assert_allclose(gap, case.deficient.rate(record.t[k], truth.x[k], record.u[k]), atol=1e-12)
     hit = {missing.equation for missing in case.missing}
-    for i, state in enumerate(case.deficient.states):
-        assert bool(np.any(truth.d[:, i] != 0)) == (state in hit)
+    assert hit
+    assert hit <= {*case.deficient.states, *case.deficient.outputs, *case.deficient.inputs}
+    if list(case.truth.states) == list(case.deficient.states):
+        for k in range(0, len(record), 40):
+            gap = case.truth.rate(record.t[k], truth.x[k], record.u[k]) - truth.d[k]
+            wanted = case.deficient.rate(record.t[k], truth.x[k], record.u[k])
+            np.testing.assert_allclose(gap, wanted, rtol=1e-9, atol=1e-12)
+    if not hit & set(case.deficient.inputs):
+        for i, state in enumerate(case.deficient.states):
+            assert bool(np.any(truth.d[:, i] != 0)) == (state in hit)
+
+
+@pytest.mark.parametrize("name", NULL)
+def test_a_null_case_lacks_nothing(name: str) -> None:
+    """With the true parameters (which only a case tagged so gets wrong) the model error of a null case is zero."""
+    case = plugins.cases()[name]
+    assert case.truth is not None
+    assert case.missing == ()
+    right = case.deficient.with_values({n: p.value for n, p in case.truth.parameters.items()})
+    assert (right == case.deficient) == ("wrong-parameter" not in case.tags)
+    assert not np.any(replace(case, deficient=right).simulate(0.0, 0)[1].d)
+
+
+@pytest.mark.parametrize("name", LACKING)
+def test_what_is_missing_is_visible(name: str) -> None:
+    """The deficient model's free run misses a measurement by more than three times the 1 % noise; the plant is finite.
+
+    The runs start from the true first state with the file's parameters.
+    """
+    case = plugins.cases()[name]
+    record, truth = case.simulate(0.01, 0)
+    assert np.all(np.isfinite(truth.x))
+    errors = np.abs(_free_run(case).y - case.simulate(0.0, 0)[0].y)
+    assert np.any(np.sqrt(np.nanmean(errors**2, axis=0)) > 3 * truth.noise)
+    assert 150 <= len(record) <= (5001 if {"published", "chaotic"} & set(case.tags) else 1001)
+
+
+def _free_run(case: Case) -> Record:
+    """What the sensors would read if the deficient model were the plant."""
+    assert case.truth is not None
+    assert case.experiment is not None
+    first = dict(zip(case.truth.states, case.experiment.x0, strict=True))
+    start = tuple(first[name] for name in case.deficient.states)
+    return replace(case, truth=case.deficient, experiment=replace(case.experiment, x0=start)).simulate(0.0, 0)[0]
+
+
+@pytest.mark.parametrize("name", WITH_TRUTH)
+def test_a_known_first_state_is_the_true_one(name: str) -> None:
+    """A first state that the model calls known is where the plant starts; every tag is a word; parameters say how well
+    they are known.
+    """
+    case = plugins.cases()[name]
+    assert case.truth is not None
+    assert case.experiment is not None
+    first = dict(zip(case.truth.states, case.experiment.x0, strict=True))
+    for state, initial in case.deficient.initial.items():
+        assert initial.estimate or initial.value == first[state]
+    assert case.tags
+    assert list(case.truth.outputs) == list(case.deficient.outputs)
+    assert list(case.truth.inputs) == list(case.deficient.inputs) == list(case.experiment.inputs)
+    for missing in case.missing:
+        for parameter, value in missing.coefficients.items():
+            assert case.truth.parameters[parameter].value == value
+
+
+@pytest.mark.parametrize("name", LARGE)
+def test_a_large_case_differs_in_its_missing_terms(name: str) -> None:
+    """Of a case too large to compile here, truth and model differ in the named equations and in no other."""
+    case = plugins.cases()[name]
+    assert case.truth is not None
+    pairs = zip(case.deficient.states, case.deficient.rates, case.truth.rates, strict=True)
+    assert {state for state, model, truth in pairs if model != truth} == {m.equation for m in case.missing}
+
+
+def test_a_plant_may_have_a_state_that_its_model_lacks() -> None:
+    """The truth's own state is integrated with the others and kept from the record's truth: x' = z, z' = -x in turn."""
+    model = Model("x", {"x": "-x"}, outputs={"x": Output("x", column="x")})
+    plant = replace(model, states={"z": "-x", "x": "z"})
+    case = Case("turning", "", model, plant, Experiment(6.0, 0.05, (1.0, 0.0), every={"x": 4}))
+    record, truth = case.simulate(0.0, 0)
+    np.testing.assert_allclose(truth.x[:, 0], np.sin(record.t), atol=1e-9)
+    np.testing.assert_allclose(truth.d[:, 0], np.cos(record.t) + np.sin(record.t), atol=1e-9)
+    seen = np.flatnonzero(~np.isnan(record.y[:, 0]))
+    np.testing.assert_array_equal(seen, np.arange(4, len(record), 4))
 
 
 def test_a_held_model_error_carries_the_plant() -> None:

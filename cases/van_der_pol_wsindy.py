@@ -1,0 +1,24 @@
+"""The Van der Pol oscillator of the weak-form sparse regression, without its nonlinear damping."""
+
+from suite.case import Case, Experiment, Missing
+from suite.model import Initial, Model, Output, Parameter
+
+DEFICIENT = Model(
+    name="undamped oscillator",
+    states={"x": "y", "y": "-k*x"},
+    parameters={"k": Parameter(1.0, sd=0.05)},
+    outputs={"x": Output("x", column="x"), "y": Output("y", column="y")},
+    initial={"x": Initial(0.0, estimate=True), "y": Initial(1.0, estimate=True)},
+)
+PLANT = DEFICIENT.plus("y", "+mu*(1 - x**2)*y", {"mu": Parameter(4.0)})
+EXPERIMENT = Experiment(30.0, 0.01, (0.0, 1.0))
+
+CASE = Case(
+    name="van-der-pol-wsindy",
+    sentence="Messenger and Bortz (2021), Van der Pol: the damping mu (1 - x^2) x' is missing and in no library.",
+    deficient=DEFICIENT,
+    truth=PLANT,
+    experiment=EXPERIMENT,
+    missing=(Missing("nonlinear_damping", "y", {"mu": 4.0}),),
+    tags=("mechanical", "published", "outside"),
+)
