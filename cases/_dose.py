@@ -12,16 +12,13 @@ from suite.record import Record, join
 
 
 def drug(name: str, sentence: str, package: str, table: str, time: str, k: Parameter, first: float) -> Case:
-    """A case from a table with the columns Subject, `time` and conc; `k` and `first` are rough starts.
-
-    The logarithm of the concentration is compared: an assay errs by a share of what it measures.
-    """
+    """A case from a table with the columns Subject, `time` and conc; `k` and `first` are rough starts."""
 
     def subjects() -> tuple[Record, ...]:
         frame = packaged(name, package, table)
-        subject, t, log = numbers(frame, "Subject"), numbers(frame, time), np.log(numbers(frame, "conc"))
+        subject, t, conc = numbers(frame, "Subject"), numbers(frame, time), numbers(frame, "conc")
         rows = [subject == number for number in np.unique(subject)]
-        return tuple(run(f"subject {i + 1}", t[row], [], [log[row]]) for i, row in enumerate(rows))
+        return tuple(run(f"subject {i + 1}", t[row], [], [conc[row]]) for i, row in enumerate(rows))
 
     def measured(folder: Path | None) -> Record:
         return join(subjects()[:-1])
@@ -34,7 +31,7 @@ def drug(name: str, sentence: str, package: str, table: str, time: str, k: Param
         name="one compartment",
         states={"C": "-k*C"},
         parameters={"k": k},
-        outputs={"log_conc": Output("log(C)", column="log_conc")},
+        outputs={"conc": Output("C", column="conc")},
         initial={"C": Initial(first, estimate=True)},
     )
     tags = ("measured", "compartment")

@@ -1,0 +1,149 @@
+"""On held-out measurements the error falls to its target once the missing effect is in the model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from suite import plugins
+from suite.benchmark import held_out
+from suite.case import Case, Held
+from suite.discovery.fit import fit
+from suite.errors import DataError, InputError
+from suite.model import Initial, Model, Output, Parameter
+from suite.record import Record
+
+CASES = [name for name, case in plugins.cases().items() if case.measured is not None]
+POSITIVE = (0.0, np.inf)
+
+
+def loss(value: float) -> Parameter:
+    """A coefficient that cannot be negative and of which nothing else is known."""
+    return Parameter(value, free=True, bounds=POSITIVE)
+
+
+def drag(model: Model) -> Model:
+    """With quadratic drag."""
+    return model.plus("v", "-a*v*abs(v)", {"a": loss(1e-3)})
+
+
+def hardening(model: Model) -> Model:
+    """With a cubic spring."""
+    return model.plus("v", "-a*p**3", {"a": Parameter(0.0, free=True)})
+
+
+def dry_friction(model: Model) -> Model:
+    """With Coulomb friction."""
+    return model.plus("v", "-a*tanh(v/1e-3)", {"a": loss(0.2)})
+
+
+def overflows(model: Model) -> Model:
+    """With an upper tank that runs over into the lower one, and water lost where both are full."""
+    upper = {"a": loss(0.1), "h": Parameter(8.0, free=True, bounds=(1.0, 20.0))}
+    lost = {"b": loss(0.1), "w": Parameter(15.0, free=True, bounds=(5.0, 30.0))}
+    return model.plus("upper", "-a*max(upper - h, 0)", upper).plus("both", "-b*max(both - w, 0)", lost)
+
+
+def tissue(model: Model) -> Model:
+    """With a second compartment, at a concentration of its own."""
+    k = model.parameters["k"].value
+    inner = {"a": loss(k), "w": Parameter(1.0 / k, free=True, bounds=(0.01 / k, 100.0 / k))}
+    return replace(
+        model,
+        states={"C": f"{model.states['C']} - a*(C - W)", "W": "(C - W)/w"},
+        parameters={**model.parameters, **inner},
+        initial={**model.initial, "W": Initial(0.0, estimate=True)},
+    )
+
+
+def bias(model: Model) -> Model:
+    """With a voltmeter that is off by a constant, as a current that leaks in."""
+    return model.plus("V", "+a", {"a": Parameter(0.0, free=True)})
+
+
+@dataclass(frozen=True)
+class Story:
+    """A case: its effect, and by held-out part the error before (known to a few percent) and at most after."""
+
+    case: str
+    grown: Callable[[Model], Model]
+    errors: Mapping[str, tuple[float, float]]
+    fitted: int | None = None  # samples that are enough to fit, where there are very many
+
+
+STORIES = (
+    Story("silverbox", hardening, {"arrow": (14.4e-3, 1.0e-3), "multisine": (7.0e-3, 0.95e-3)}, 20000),
+    Story("emps", dry_friction, {"pulses": (0.286, 0.135)}, 2500),
+    Story("cascaded-tanks", overflows, {"validation": (0.671, 0.40)}),
+    Story("rocket-camoes", drag, {"last 40 %": (132.0, 12.0)}),
+    Story("rocket-genesis", drag, {"last 40 %": (113.0, 25.0)}),
+    Story("rocket-andromeda", drag, {"last 40 %": (76.7, 16.0)}),
+    Story("rocket-erebus", drag, {"last 40 %": (114.0, 5.0)}),
+    Story("whiffle-ball", drag, {"last run": (2.58, 0.25)}),
+    Story("whiffle-ball-2", drag, {"drop 2": (2.47, 0.51)}),
+    Story("yellow-whiffle-ball", drag, {"drop 2": (3.12, 0.66)}),
+    Story("volleyball", drag, {"drop 2": (1.10, 0.2)}),
+    Story("tennis-ball", drag, {"drop 2": (1.18, 0.35)}),
+    Story("blue-basketball", drag, {"drop 2": (0.625, 0.26)}),
+    Story("green-basketball", drag, {"drop 2": (0.449, 0.15)}),
+    Story("baseball", drag, {"drop 2": (0.176, 0.17)}),
+    Story("capacitor", bias, {"last 30 %": (0.0918, 0.0095)}),
+    Story("indometacin", tissue, {"subject 6": (0.129, 0.04)}),
+    Story("cefamandole", tissue, {"subject 6": (12.9, 6.0)}),
+)
+
+
+def there(case: Case) -> tuple[Record, dict[str, Held]]:
+    """The case's parts; the test is skipped with the reason where its data are not there."""
+    try:
+        train, held = held_out.parts(case, None)
+    except DataError as error:
+        pytest.skip(str(error))
+    return train, dict(held)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_what_is_judged_is_of_the_same_kind_and_never_fitted(name: str) -> None:
+    """Fitted and judged parts have the model's columns; a judged sample is in no fitted run."""
+    case = plugins.cases()[name]
+    train, held = there(case)
+    shape = (len(case.deficient.inputs), len(case.deficient.outputs))
+    seen = {row.tobytes() for row in np.column_stack([train.t, train.u, train.y])}
+    for part in held.values():
+        assert (part.record.u.shape[1], part.record.y.shape[1]) == shape
+        assert part.first < len(part.record)
+        judged = np.column_stack([part.record.t, part.record.u, part.record.y])[part.first :]
+        # A sensor that reads in steps may read the same twice.
+        assert sum(row.tobytes() in seen for row in judged) < 0.2 * len(judged)
+        assert part.lead is None or part.lead <= max(part.first, 50)
+
+
+@pytest.mark.parametrize("story", STORIES, ids=lambda story: story.case)
+def test_the_missing_effect_brings_the_error_to_its_target(story: Story) -> None:
+    """Fitted to the training part alone, the deficient model errs as published and the grown one as it should."""
+    case = plugins.cases()[story.case]
+    train, held = there(case)
+    train = train if story.fitted is None else train.part(0, story.fitted)
+    deficient = fit(case.deficient, train).model
+    grown = fit(story.grown(case.deficient), train).model
+    (output,) = case.deficient.outputs
+    for part, (before, after) in story.errors.items():
+        assert held_out.error(deficient, held[part])[output] == pytest.approx(before, rel=0.04)
+        assert held_out.error(grown, held[part])[output] <= after
+
+
+def test_a_simulation_that_runs_away_has_no_error_to_show() -> None:
+    """A model that diverges on the held-out part is infinitely wrong, not zero."""
+    model = Model("explosion", {"x": "x**3"}, outputs={"x": Output("x", column="x")}, initial={"x": Initial(1.0)})
+    t = np.linspace(0.0, 10.0, 40)
+    record = Record(t, np.zeros((40, 0)), np.ones((40, 1)))
+    assert held_out.error(model, Held(record, lead=20, first=20))["x"] == np.inf
+
+
+def test_a_pattern_without_a_case_is_refused() -> None:
+    """`--only` names what there is."""
+    with pytest.raises(InputError, match="cooling-mug"):
+        held_out.chosen("no such thing")
