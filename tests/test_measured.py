@@ -48,13 +48,12 @@ def overflows(model: Model) -> Model:
 
 
 def tissue(model: Model) -> Model:
-    """With a second compartment, at a concentration of its own."""
-    k = model.parameters["k"].value
-    inner = {"a": loss(k), "w": Parameter(1.0 / k, free=True, bounds=(0.01 / k, 100.0 / k))}
+    """With a second compartment, which is not empty at the first sample."""
+    k = model.parameters["k"]
     return replace(
         model,
-        states={"C": f"{model.states['C']} - a*(C - W)", "W": "(C - W)/w"},
-        parameters={**model.parameters, **inner},
+        states={"C": f"{model.states['C']} - a*C + b*W", "W": "a*C - b*W"},
+        parameters={"k": k, "a": k, "b": k},
         initial={**model.initial, "W": Initial(0.0, estimate=True)},
     )
 
