@@ -15,6 +15,7 @@ from typing import Any
 
 from suite import plugins
 from suite.discovery import checkup, misfit
+from suite.discovery.evidence import evidence
 from suite.discovery.fit import fit, prepare
 from suite.discovery.library import candidates
 from suite.discovery.loop import discover as loop
@@ -124,19 +125,12 @@ def compare(args: argparse.Namespace) -> int:
     if args.refit:
         model = fit(model, record).model
     found = misfit.compare(model, record)
+    failing = evidence(model, record, found)
     if args.json:
         noise = dict(zip(model.outputs, map(float, found.sigma), strict=True))
-        worst = [{"run": run, "from": first, "to": last} for run, first, last in found.worst]
-        return _json(
-            {
-                "fit": dict(found.fit),
-                "error": dict(found.error),
-                "noise": noise,
-                "worst": worst,
-                "sentence": found.sentence,
-            }
-        )
-    print(found.sentence)
+        numbers = {"fit": dict(found.fit), "error": dict(found.error), "noise": noise}
+        return _json({**numbers, "worst": failing["worst"], "sentence": found.sentence, "where": failing})
+    print(found.sentence, failing["sentence"], sep="\n")
     return 0
 
 

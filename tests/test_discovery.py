@@ -10,7 +10,7 @@ import pytest
 
 from suite import plugins
 from suite.case import Case, Experiment
-from suite.discovery import misfit
+from suite.discovery.discrepancy import discrepancy
 from suite.discovery.engine import Point
 from suite.discovery.fit import fit, prepare
 from suite.discovery.library import candidates
@@ -184,7 +184,7 @@ def test_the_smoothed_error_follows_the_true_one(paper: Case, record: Record) ->
         paper.deficient, parameters={n: replace(p, fixed=True) for n, p in paper.deficient.parameters.items()}
     )
     problem = prepare(fixed, record)
-    found = misfit.discrepancy(problem, problem.start)
+    found = discrepancy(problem, problem.start)
     d = paper.simulate(0.05, 7)[1].d
     assert np.corrcoef(found.d[:, 0], d[:, 0])[0, 1] > 0.9
     assert (found.equation, found.variable) == ("x1", "x2")

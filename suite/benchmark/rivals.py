@@ -13,15 +13,16 @@ from scipy import stats
 
 from suite import plugins
 from suite.benchmark import columns
+from suite.benchmark.better import walk_density
 from suite.benchmark.conditions import Trial
-from suite.discovery import misfit
 from suite.discovery.fit import fit
 from suite.discovery.noise import noise_variance
 from suite.model import Model
 from suite.prior import default_prior
+from suite.record import Record
 
 Array = npt.NDArray[np.float64]
-Name = tuple[str, str]
+Name = columns.Name
 
 SIGNIFICANT = 0.01  # of all correlations together: below it the test names its best
 MOST = 3  # terms that a regression may take
@@ -36,14 +37,22 @@ class Answer:
     candidates: int = 0
 
 
+def calibrated(trial: Trial) -> tuple[Model, Record]:
+    """The deficient model refitted to the record, and the record with what an estimator may know."""
+    model = fit(trial.model, trial.record).model
+    sigma = np.sqrt(noise_variance(model, trial.record))
+    return model, trial.record.with_prior(default_prior(model, trial.record, sigma))
+
+
 def correlation(trial: Trial) -> Answer:
     """The correlation test on the causal filter's d (Raol and others 2016): the candidate most correlated with it."""
-    model = fit(trial.model, trial.record).model
-    prior = default_prior(model, trial.record, np.sqrt(noise_variance(model, trial.record)))
-    estimate = plugins.estimators()["generalized-ie"].estimate(model, trial.record.with_prior(prior))
+    model, record = calibrated(trial)
+    estimate = plugins.estimators()["generalized-ie"].estimate(model, record)
     if estimate.d is None or not np.isfinite(estimate.d).all():
         raise FloatingPointError("the filter left the finite numbers")
-    found = _columns(trial, model, estimate.x)
+    found = columns.named(model, trial.effects, record, estimate.x)
+    disguised = columns.disguised(model, record, estimate.x, found)
+    found = {name: column for name, column in found.items() if name not in disguised}
     order = list(model.states)
     scores = {}
     for name, column in found.items():
@@ -61,25 +70,31 @@ def correlation(trial: Trial) -> Answer:
 
 
 def smoothed_regression(trial: Trial) -> Answer:
-    """Forward selection by EBIC on the smoothed d of a random-walk disturbance."""
-    fitted = fit(trial.model, trial.record)
-    found = misfit.discrepancy(fitted.problem, fitted.hypothesis.exact.point)
+    """Forward selection by EBIC on the smoothed d of a random-walk disturbance of the likeliest density."""
+    model, record = calibrated(trial)
+    smoother = plugins.estimators()["random-walk-smoother"]
+    estimate = smoother.estimate(model, record, q_scale=walk_density(model, record))
+    if estimate.d is None or not np.isfinite(estimate.d).all():
+        raise FloatingPointError("the smoother left the finite numbers")
+    found = columns.named(model, trial.effects, record, estimate.x)
+    disguised = columns.disguised(model, record, estimate.x, found)
     by_equation: dict[str, dict[Name, Array]] = {}
-    for name, column in _columns(trial, fitted.model, found.x).items():
+    for name, column in found.items():
         by_equation.setdefault(name[1], {})[name] = column
-    library = sum(len(group) for group in by_equation.values())
+    library = len(found)
     taken: list[tuple[float, Name]] = []
     firsts: list[tuple[float, Name]] = []
     for equation, group in by_equation.items():
-        d = found.d[:, list(fitted.model.states).index(equation)]
+        d = estimate.d[:, list(model.states).index(equation)]
         if not d.any():
             continue
         # What no candidate explains tells how many of the samples are independent.
         count = independent(d, np.column_stack(list(group.values())))
         firsts += [(count * np.log(_rss([column], d) / float(d @ d)), name) for name, column in group.items()]
         taken += _forward(group, d, count, library)
-    ranked = tuple(name for _, name in sorted(firsts))
-    named = tuple(name for _, name in sorted(taken)[:MOST])
+    # A parameter in disguise corrects the calibration; it is no missing effect.
+    ranked = tuple(name for _, name in sorted(firsts) if name not in disguised)
+    named = tuple(name for _, name in sorted(taken) if name not in disguised)[:MOST]
     return Answer(named, (*named, *(name for name in ranked if name not in named)), library)
 
 
@@ -119,13 +134,3 @@ def independent(d: Array, A: Array) -> float:
     power = float(a @ a)
     r = float(a[1:] @ a[:-1]) / power if power > 0 else 0.0
     return max(len(d) * (1.0 - r) / (1.0 + r), 2.0)
-
-
-def _columns(trial: Trial, model: Model, x: Array) -> dict[Name, Array]:
-    """The candidates' columns along the estimated states; where one effect binds twice in an equation, the first."""
-    found: dict[Name, Array] = {}
-    for term in columns.in_rates(model, trial.effects):
-        values = columns.column(model, term, trial.record, x)
-        if values is not None and values.any():
-            found.setdefault((term.effect.id, term.equation), values)
-    return found

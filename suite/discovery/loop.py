@@ -6,10 +6,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from suite.discovery import misfit
+from suite.discovery.discrepancy import discrepancy
 from suite.discovery.fit import Hypothesis, summarise
 from suite.discovery.identify import Search
 from suite.discovery.result import Ledger, Step, Verdict
 from suite.discovery.verdict import amended, investigate, judge
+from suite.discovery.where import where
+from suite.discovery.whiteness import whiteness
 from suite.discovery.words import headline
 from suite.effect import Effect
 from suite.model import Model
@@ -62,16 +65,16 @@ def _step(found: Search, verdict: Verdict) -> Step:
     fitted = summarise(problem, base)
     names = list(problem.model.outputs)
     comparison = misfit.compare(fitted.model, problem.record, base.exact.passed.Y, problem.R**0.5)
-    error = misfit.discrepancy(problem, base.exact.point)
-    where = misfit.where(error, problem.record, list(problem.model.states))
+    error = discrepancy(problem, base.exact.point)
+    said = where(error, problem.record, problem.model)
     residual = (problem.record.y - base.exact.passed.Y) / problem.R**0.5
     held = verdict.error.get("held_out", {}).get("before", {})
     return Step(
         fitted.model,
-        replace(comparison, sentence=f"{comparison.sentence} {where}"),
+        replace(comparison, sentence=f"{comparison.sentence} {said}"),
         held,
         error,
-        misfit.whiteness(problem.record, residual, names),
+        whiteness(problem.record, residual, names),
         verdict,
     )
 

@@ -35,7 +35,9 @@ class Comparison:
 class Discrepancy:
     """The smoothed model error: x (N, n) smoothed states, d (N, n) in rate units with standard deviation d_sd (N, n),
     zero where an equation is a definition; `variable` the state against which it is best ordered, `equation` where it
-    is largest, `ratio` the correlation ratio (0..1) of d against that variable over bins.
+    is largest, `ratio` the correlation ratio (0..1) of d against that variable over bins; `values` (N,) are the
+    variable's samples, `ratios` the correlation ratios of all that was tried. Where no filter stayed finite, d is zero
+    and d_sd infinite.
     """
 
     x: Array
@@ -44,6 +46,8 @@ class Discrepancy:
     equation: str
     variable: str
     ratio: float
+    values: Array | None = None
+    ratios: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,10 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 
 from suite.discovery.result import Candidate, Discrepancy
+from suite.discovery.state_map import FEW, bins
+from suite.discovery.state_map import state_map as mapped
+from suite.discovery.variable import samples
+from suite.discovery.where import where
 from suite.model import Model
 from suite.record import Record
 from suite.report.canvas import (
@@ -33,38 +37,15 @@ from suite.report.canvas import (
 )
 from suite.report.figures import plain
 
-BINS = 24
-CELLS = (6, 24)
-FEW = 5
 
-
-def along(model: Model, record: Record, misfit: Discrepancy) -> tuple[Array, str]:
-    """The samples of the variable that orders the discrepancy, (N,), and its label."""
-    name = misfit.variable
+def label_of(model: Model, record: Record, name: str) -> str:
+    """What the discrepancy's variable is, for an axis."""
     if name in model.states:
-        return misfit.x[:, list(model.states).index(name)], f"{name} (smoothed state)"
+        return f"{name} (smoothed state)"
     if name in model.inputs:
-        return record.u[:, list(model.inputs).index(name)], f"{name} (input)"
+        return f"{name} (input)"
     state = name.removesuffix("'")
-    if state != name and state in model.states:
-        x = misfit.x[:, list(model.states).index(state)]
-        spans = zip(record.bounds[:-1], record.bounds[1:], strict=True)
-        return np.concatenate([np.gradient(x[a:b], record.t[a:b]) for a, b in spans]), f"rate of {state}"
-    return record.t, time_label(record, model)
-
-
-def binned(variable: Array, values: Array, bins: int = BINS) -> tuple[Array, Array, npt.NDArray[np.int64]]:
-    """Means of variable and values over equal bins of the variable, and their counts; only bins with FEW samples."""
-    known = np.isfinite(variable) & np.isfinite(values)
-    v, d = variable[known], values[known]
-    edges = np.linspace(v.min(), v.max(), bins + 1) if len(v) else np.zeros(bins + 1)
-    place = np.clip(np.searchsorted(edges, v, side="right") - 1, 0, bins - 1)
-    count = np.bincount(place, minlength=bins)
-    enough = count >= FEW
-    safe = np.maximum(count, 1)
-    centre = np.bincount(place, v, bins) / safe
-    mean = np.bincount(place, d, bins) / safe
-    return centre[enough], mean[enough], count[enough]
+    return f"rate of {state}" if state in model.states else time_label(record, model)
 
 
 def discrepancy(
@@ -76,13 +57,9 @@ def discrepancy(
     """
     i = list(model.states).index(misfit.equation)
     d, sd = misfit.d[:, i], misfit.d_sd[:, i]
-    v, label = along(model, record, misfit)
+    v, label = samples(model, record, misfit), label_of(model, record, misfit.variable)
     ylabel = f"missing in {misfit.equation}' ({misfit.equation} per time)"
-    title = f"What the equation of {misfit.equation} lacks follows {misfit.variable}"
-    if misfit.ratio < 0.3:
-        title = (
-            f"What the equation of {misfit.equation} lacks follows no single variable; {misfit.variable} comes closest"
-        )
+    title = where(misfit, record, model)
     said = f"{100 * misfit.ratio:.0f} % of the variation of the model error is explained by {misfit.variable}"
     fig = new_figure(title, f"Smoothed model error over time and against {misfit.variable}. {said}", 6.4)
     upper, lower = fig.subplots(2, 1, height_ratios=[1.0, 1.35])
@@ -102,13 +79,15 @@ def discrepancy(
 
     kept = thinned(d, most)
     dots(lower, v[kept], d[kept], "#C9CED3", "d, each sample", 2.6)
-    if len(v):
-        centre, mean, _ = binned(v, d)
-        spread = np.sqrt(binned(v, np.where(np.isfinite(d), sd**2, np.nan))[1])
-        lower.fill_between(
-            centre, mean - BAND95 * spread, mean + BAND95 * spread, color=SKY, alpha=0.4, linewidth=0, zorder=3
-        )
-        lower.plot(centre, mean, "o-", color=BLUE, markersize=4.5, linewidth=1.4, label="d, mean of a bin", zorder=4)
+    b = bins(misfit, v, record, i)
+    visited = b.count > 0
+    centre, mean, spread = 0.5 * (b.edges[1:] + b.edges[:-1])[visited], b.mean[visited], BAND95 * b.sd[visited]
+    lower.fill_between(centre, mean - spread, mean + spread, color=SKY, alpha=0.4, linewidth=0, zorder=3)
+    lower.plot(centre, mean, "o-", color=BLUE, markersize=4.5, linewidth=1.4, label="d, mean of a bin", zorder=4)
+    few = b.count[visited] < FEW
+    if few.any():
+        said_few = f"fewer than {FEW} samples"
+        lower.plot(centre[few], mean[few], "o", color=BLUE, mfc="white", markersize=4.5, label=said_few, zorder=5)
     if curve is not None:
         _fitted(lower, v, curve, f"candidate: {named}", most)
     lower.axhline(0, color=INK, linewidth=0.8)
@@ -131,31 +110,12 @@ def _fitted(ax: Axes, v: Array, curve: Array, label: str, most: int) -> None:
     ax.plot(x[kept], y[kept], color=VERMILION, linewidth=2.2, label=label, zorder=5)
 
 
-def axes_of_map(model: Model, misfit: Discrepancy) -> tuple[str, str] | None:
-    """The two states of the map: the one that orders the discrepancy, and the equation's own or the next."""
-    states = list(model.states)
-    if len(states) < 2:
-        return None
-    preferred = [name for name in (misfit.variable, misfit.equation, *states) if name in states]
-    first, second = list(dict.fromkeys(preferred))[:2]
-    return (first, second) if states.index(first) < states.index(second) else (second, first)
-
-
 def state_map(model: Model, misfit: Discrepancy) -> Figure | None:
     """Mean discrepancy in cells of two states, hatched where fewer than 5 samples say it; None with a single state."""
-    pair = axes_of_map(model, misfit)
-    if pair is None:
+    cells = mapped(model, misfit)
+    if cells is None:
         return None
-    states = list(model.states)
-    a, b = (misfit.x[:, states.index(name)] for name in pair)
-    d = misfit.d[:, states.index(misfit.equation)]
-    known = np.isfinite(a) & np.isfinite(b) & np.isfinite(d)
-    a, b, d = a[known], b[known], d[known]
-    # About a dozen samples a cell, if they were spread evenly.
-    cells = int(np.clip(np.sqrt(len(d) / 12), *CELLS))
-    total, ea, eb = np.histogram2d(a, b, bins=cells, weights=d)
-    count = np.histogram2d(a, b, bins=(ea, eb))[0]
-    mean = np.where(count > 0, total / np.maximum(count, 1), np.nan)
+    pair, ea, eb, mean, count = (cells.x, cells.y), cells.x_edges, cells.y_edges, cells.mean, cells.count
     reach = float(np.nanmax(np.abs(mean[count >= FEW]), initial=0.0)) or float(np.nanmax(np.abs(mean), initial=0.0))
     title = f"Where the equation of {misfit.equation} is wrong, over {pair[0]} and {pair[1]}"
     said = f"Mean model error of {misfit.equation} in cells of {pair[0]} and {pair[1]}; strongest {reach:.3g}"

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
+from suite.discovery.misfit import residual
 from suite.discovery.result import Candidate, Comparison, Ledger, Step, Verdict
 from suite.model import Model
 from suite.record import Record
 from suite.report.canvas import (
     BAND95,
-    BAND99,
     BLUE,
     GREEN,
     INK,
@@ -36,15 +34,6 @@ from suite.report.canvas import (
 SEPARABLE = 16.0
 
 
-def residuals(model: Model, record: Record, comparison: Comparison) -> Array:
-    """Measured minus simulated in units of the noise, (N, outputs); angles by the shorter way round."""
-    e = record.y - finite(comparison.Y)
-    for j, output in enumerate(model.outputs.values()):
-        if output.angle:
-            e[:, j] = (e[:, j] + np.pi) % (2 * np.pi) - np.pi
-    return e / np.where(comparison.sigma > 0, comparison.sigma, 1.0)
-
-
 def finite(Y: Array) -> Array:
     """A simulation without what left every scale when it diverged (NaN there), so that the rest can be drawn."""
     return np.where(np.abs(Y) < 1e100, Y, np.nan)
@@ -53,11 +42,10 @@ def finite(Y: Array) -> Array:
 def compare(model: Model, record: Record, comparison: Comparison, most: int = MOST) -> Figure:
     """Measured (dots) beside simulated (line) for each output, and below it their difference in units of the noise."""
     names = list(model.outputs)
-    title = comparison.sentence or _judged(comparison)
-    fig = new_figure(title, _spoken(comparison), 0.9 + 3.5 * len(names))
+    fig = new_figure(_judged(comparison), _spoken(comparison), 0.9 + 3.5 * len(names))
     grid = fig.add_gridspec(2 * len(names), 1, height_ratios=[1.8, 1.0] * len(names))
     t, offsets = timeline(record)
-    e = residuals(model, record, comparison)
+    e = residual(model, record, comparison.Y, comparison.sigma)
     shown = []
     for j, name in enumerate(names):
         upper = fig.add_subplot(grid[2 * j])
@@ -74,7 +62,7 @@ def compare(model: Model, record: Record, comparison: Comparison, most: int = MO
         samples(lower, record, t, e[:, j], BLUE, "measured - simulated", most, 2.4)
         dressed(lower, time_label(record, model) if j == len(names) - 1 else "", "residual / noise")
         for ax in (upper, lower):
-            for k, (run, first, last) in enumerate(comparison.worst):
+            for k, (run, first, last) in enumerate(_merged(record, comparison)):
                 label = "worst intervals" if k == 0 else None
                 ax.axvspan(first + offsets[run], last + offsets[run], color=ORANGE, alpha=0.2, linewidth=0, label=label)
         upper.margins(x=0.01)
@@ -82,6 +70,18 @@ def compare(model: Model, record: Record, comparison: Comparison, most: int = MO
     fig.align_ylabels(shown)
     legend_below(fig, *shown)
     return fig
+
+
+def _merged(record: Record, comparison: Comparison) -> list[tuple[int, float, float]]:
+    """The worst intervals, neighbours as one."""
+    merged: list[tuple[int, float, float]] = []
+    for run, first, last in sorted(comparison.worst):
+        between = record.runs[run].t
+        if merged and merged[-1][0] == run and not ((between > merged[-1][2]) & (between < first)).any():
+            merged[-1] = (run, merged[-1][1], last)
+        else:
+            merged.append((run, first, last))
+    return merged
 
 
 def _times(ratio: float) -> str:
@@ -118,38 +118,6 @@ def _spoken(comparison: Comparison) -> str:
         for name, sigma in zip(comparison.error, comparison.sigma, strict=False)
     ]
     return "Measured and simulated outputs over time, residuals below. " + "; ".join(said)
-
-
-def autocorrelation(model: Model, record: Record, correlation: Mapping[str, Array]) -> Figure:
-    """Autocorrelation of the residual from lag 1, one panel an output, with the 99 % band of white noise."""
-    names = list(model.outputs)
-    count = {name: int(np.isfinite(record.y[:, j]).sum()) for j, name in enumerate(names)}
-    band = {name: BAND99 / np.sqrt(max(count.get(name, len(record)), 1)) for name in correlation}
-    beyond = {name: int((np.abs(r) > band[name]).sum()) for name, r in correlation.items()}
-    # One lag in a hundred leaves a 99 % band by chance.
-    coloured = [name for name, r in correlation.items() if beyond[name] > max(1, 0.03 * len(r))]
-    title = (
-        f"The residual of {' and '.join(coloured)} repeats itself: something regular is left in it"
-        if coloured
-        else "The residual is white: nothing regular is left in it"
-    )
-    said = "; ".join(f"{name}: {beyond[name]} of {len(r)} lags outside" for name, r in correlation.items())
-    fig = new_figure(title, f"Autocorrelation of the residuals with 99 % bands. {said}", 0.9 + 1.9 * len(correlation))
-    axes = fig.subplots(max(len(correlation), 1), 1, squeeze=False)[:, 0]
-    for ax, (name, r) in zip(axes, correlation.items(), strict=False):
-        lags = np.arange(1, len(r) + 1)
-        outside = np.abs(r) > band[name]
-        ax.axhspan(-band[name], band[name], color=GREEN, alpha=0.25, linewidth=0, label="white noise, 99 %")
-        ax.axhline(0, color=INK, linewidth=0.8)
-        ax.bar(lags[~outside], r[~outside], width=0.5, color=BLUE, label="inside the band")
-        if outside.any():
-            ax.bar(lags[outside], r[outside], width=0.5, color=VERMILION, label="outside the band")
-        ax.margins(x=0.02)
-        reach = max(1.3 * band[name], 1.1 * float(np.max(np.abs(r), initial=0.0)))
-        ax.set_ylim(-reach, reach)
-        dressed(ax, "lag (samples)", "autocorrelation", f"{name}: {beyond[name]} of {len(r)} lags outside the band")
-    legend_below(fig, *axes)
-    return fig
 
 
 def change(steps: tuple[Step, ...], at: int) -> str:

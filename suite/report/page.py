@@ -14,11 +14,12 @@ from matplotlib.figure import Figure
 
 from suite import __version__
 from suite.discovery.result import Candidate, Ledger, Step, Verdict
+from suite.discovery.whiteness import band
 from suite.effect import Effect
 from suite.files import write_whole
 from suite.model import Model
-from suite.report import failure, figures
-from suite.report.canvas import BAND99, MOST
+from suite.report import correlation, failure, figures
+from suite.report.canvas import MOST
 from suite.report.figures import SEPARABLE, change, plain
 from suite.report.vector import share_letters, svg
 
@@ -78,7 +79,10 @@ def _drawn(ledger: Ledger, step: Step, most: int) -> dict[str, Figure]:
     if best is not None and step.verdict is not None:
         drawn["candidates"] = figures.candidates(step.verdict)
     if step.autocorrelation:
-        drawn["autocorrelation"] = figures.autocorrelation(model, record, step.autocorrelation)
+        drawn["autocorrelation"] = correlation.autocorrelation(model, record, step.autocorrelation)
+        crossed = correlation.cross(model, record, step.comparison)
+        if crossed is not None:
+            drawn["cross"] = crossed
     return drawn
 
 
@@ -270,7 +274,6 @@ def _whiteness(ledger: Ledger, step: Step) -> list[dict[str, Any]]:
     columns = {name: j for j, name in enumerate(step.model.outputs)}
     rows = []
     for name, r in step.autocorrelation.items():
-        known = int(np.isfinite(ledger.record.y[:, columns[name]]).sum())
-        beyond = int((np.abs(r) > BAND99 / max(known, 1) ** 0.5).sum())
+        beyond = int((np.abs(r) > band(ledger.record, columns[name])).sum())
         rows.append({"output": name, "lags": len(r), "beyond": beyond, "expected": 0.01 * len(r)})
     return rows
