@@ -48,10 +48,10 @@ class Effect:
     with its sign, so that a positive coefficient is the physical one. `forms` are further texts of the same effect,
     such as a stop on the other side; each is a candidate of its own. Where it acts follows from the roles:
 
-    - in a rate: "position" and "rate" are a pair p' = v with the effect in v', "angle" a position that is an angle; "state" is the state in whose equation it
-      acts, where that has no position; "content" is such a state that is no temperature; "any" is either; "other" another state; "deviation" the state minus the level
-      that its equation relaxes to (itself where there is none); "temperature" an absolute temperature, "level" its
-      ambient;
+    - in a rate: "position" and "rate" are a pair p' = v with the effect in v', "angle" a position that is an angle;
+      "state" is the state in whose equation it acts, where that has no position; "content" is such a state that is no
+      temperature; "any" is either; "other" another state; "deviation" the state minus the level that its equation
+      relaxes to (itself where there is none); "temperature" an absolute temperature, "level" its ambient;
     - in a measurement: "output" is the output's own equation, to which the term is added;
     - in an input: "input" is the input, which becomes input + term wherever it acts; "late" is the input as it was one
       coefficient earlier, "held" as it is when held the other way between samples;
@@ -62,7 +62,8 @@ class Effect:
     exactly 1 where the effect is there; it is scored as if free and not counted. `dimension` is the coefficient's, in
     words of the roles. `family` is what this term shares with its look-alikes, as a clause that completes "in each of
     them ...". `generic` effects stand in for a shape, not for physics: they are offered where no effect of the same
-    shape is.
+    shape is. `equation` names a state, output or input of one model in which the effect acts: there are no roles then,
+    and the term is in the model's own names, which those of the effect's coefficients, scales and states hide.
     """
 
     id: str
@@ -78,3 +79,4 @@ class Effect:
     pinned: bool = False
     family: str = ""
     generic: bool = False
+    equation: str = ""

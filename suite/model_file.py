@@ -6,6 +6,7 @@ import math
 import os
 import tomllib
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,13 @@ from suite.document import Document, said
 from suite.errors import ModelError
 from suite.files import write_whole
 from suite.model import Hold, Initial, Input, Model, Output, Parameter
+from suite.model_effects import effects
+from suite.model_text import to_toml as to_toml
+from suite.units import check
 
 LARGEST = 1_000_000
-TABLES = ("states", "parameters", "inputs", "outputs", "initial", "suspect")
-KEYS = ("name", "time", *TABLES)
+TABLES = ("states", "parameters", "inputs", "outputs", "initial", "suspect", "units")
+KEYS = ("name", "time", *TABLES, "effects")
 
 
 def read_model(path: str | os.PathLike[str]) -> Model:
@@ -39,75 +43,6 @@ def from_toml(text: str, source: str = "model") -> Model:
 def write_model(model: Model, path: str | os.PathLike[str]) -> None:
     """Write the model's file: whole or not at all, also where the process is killed meanwhile."""
     write_whole(Path(path), to_toml(model))
-
-
-def to_toml(model: Model) -> str:
-    """The model as the text of its file; short forms where nothing is lost by them."""
-    head = {"name": model.name} | ({"time": model.time} if model.time is not None else {})
-    blocks = ["\n".join(_line(key, value) for key, value in head.items())]
-    tables: dict[str, Mapping[str, Any]] = {
-        "states": model.states,
-        "parameters": {name: _parameter(entry) for name, entry in model.parameters.items()},
-        "inputs": {name: _input(entry) for name, entry in model.inputs.items()},
-        "outputs": {name: _output(name, entry) for name, entry in model.outputs.items()},
-        "initial": {name: _initial(entry) for name, entry in model.initial.items()},
-        "suspect": {} if model.suspect is None else {"equations": list(model.suspect)},
-    }
-    for table, entries in tables.items():
-        if entries:
-            blocks.append("\n".join([f"[{table}]", *(_line(key, value) for key, value in entries.items())]))
-    return "\n\n".join(blocks) + "\n"
-
-
-def _line(key: str, value: Any) -> str:
-    """`key = value` on one line; tomli-w writes the atoms, tables stay inline as people write them."""
-    import tomli_w
-
-    if isinstance(value, Mapping):
-        inner = ", ".join(_line(name, entry) for name, entry in value.items())
-        return _line(key, 0).removesuffix("0") + f"{{ {inner} }}"
-    if isinstance(value, list):
-        return _line(key, 0).removesuffix("0") + f"[{', '.join(_line('k', item)[4:] for item in value)}]"
-    return tomli_w.dumps({key: value}).rstrip("\n")
-
-
-def _parameter(entry: Parameter) -> Any:
-    table: dict[str, Any] = {"value": float(entry.value)}
-    if entry.sd is not None:
-        table["sd"] = float(entry.sd)
-    if entry.fixed:
-        table["fixed"] = True
-    if entry.free:
-        table["free"] = True
-    if entry.unit is not None:
-        table["unit"] = entry.unit
-    if entry.bounds != (-math.inf, math.inf):
-        table["bounds"] = [float(bound) for bound in entry.bounds]
-    return table["value"] if len(table) == 1 else table
-
-
-def _input(entry: Input) -> Any:
-    table = {"column": entry.column}
-    if entry.hold != "previous":
-        table["hold"] = entry.hold
-    if entry.delay is not None:
-        table["delay"] = entry.delay
-    return entry.column if len(table) == 1 else table
-
-
-def _output(name: str, entry: Output) -> Any:
-    table: dict[str, Any] = {"equation": entry.equation}
-    if entry.column != name:
-        table["column"] = entry.column
-    if entry.sigma is not None:
-        table["sigma"] = float(entry.sigma)
-    if entry.angle:
-        table["angle"] = True
-    return entry.equation if len(table) == 1 else table
-
-
-def _initial(entry: Initial) -> Any:
-    return {"value": float(entry.value), "estimate": True} if entry.estimate else float(entry.value)
 
 
 def _text(file: Path) -> str:
@@ -155,7 +90,7 @@ class _Reader(Document):
         self.known("", document, KEYS)
         tables = {name: self.table(document, name) for name in TABLES}
         name = document.get("name", self.source.removesuffix(".toml"))
-        return Model(
+        model = Model(
             name=self.text("name", name, "driven oscillator"),
             time=self.text("time", document["time"], "seconds") if "time" in document else None,
             states={key: self.text(f"[states] {key}", rate, "-k*x") for key, rate in tables["states"].items()},
@@ -164,8 +99,11 @@ class _Reader(Document):
             outputs={key: self.output(key, entry) for key, entry in tables["outputs"].items()},
             initial={key: self.start(key, entry) for key, entry in tables["initial"].items()},
             suspect=self.suspect(tables["suspect"]) if "suspect" in document else None,
+            units={key: self.text(f"[units] {key}", name, "m") for key, name in tables["units"].items()},
             source=self.source,
         )
+        check(model)
+        return replace(model, effects=effects(self, document["effects"], model)) if "effects" in document else model
 
     def table(self, document: Mapping[str, Any], name: str) -> Mapping[str, Any]:
         value = document.get(name, {})

@@ -33,12 +33,17 @@ def candidates(model: Model, effects: Mapping[str, Effect], absolute: bool = Fal
 
     The model's symmetries are kept: where no equation depends on a state's absolute value (height in free fall), no
     candidate of a rate may either, unless `absolute`. Of two candidates of the same shape in one equation the first
-    stays, physics before a generic stand-in.
+    stays, physics before a generic stand-in. The model's own effects come first; one that names its equation acts there
+    whatever is suspect.
     """
+    effects = {effect.id: effect for effect in model.effects} | dict(effects)
     used = set().union(*(rate.free_symbols for rate in model.rates))
     hidden = set() if absolute else {expressions.symbol(s) for s in model.states} - used
     names = Names(model)
     found: dict[tuple[str, sympy.Expr], Term] = {}
+    for term in _where_it_says(model, names):
+        shape = _shape(term, names)
+        found[(term.equation, shape if _positive(shape) else -shape)] = term
     for equation in model.suspects:
         level = _level(model, equation)
         own = [term for effect in effects.values() for term in _in_rate(model, effect, equation, level, names)]
@@ -86,11 +91,25 @@ class Names:
         return f"{wanted}_{number}"
 
 
+def _where_it_says(model: Model, names: Names) -> Iterator[Term]:
+    """The model's own effects that name their equation, in the model's own names."""
+    for effect in (effect for effect in model.effects if effect.equation):
+        target = effect.equation
+        place: Place = "rate" if target in model.states else "output" if target in model.outputs else "input"
+        own = {*effect.coefficients, *effect.inner, *effect.states}
+        for form in (effect.term, *effect.forms):
+            # What stands in a bracket with an inner scale is what that is a scale of.
+            beside = set().union(*(_words(b) for b in re.findall(r"\(([^()]*)\)", form) if _words(b) & {*effect.inner}))
+            used = [n for n in (target, *model.states, *model.inputs, expressions.TIME) if n in _words(form) - own]
+            variable = next(iter([n for n in used if n in beside] + used), target)
+            yield _bound(effect, form, place, target, "" if place == "rate" else target, {}, variable, names)
+
+
 def _in_rate(model: Model, effect: Effect, equation: str, level: str | None, names: Names) -> Iterator[Term]:
     """The effect with its role letters replaced by the states that play them in this equation."""
     position = next((p for p in model.definitions if model.states[p].strip() == equation), None)
     wanted = set(effect.roles.values())
-    if wanted & set(ELSEWHERE):
+    if wanted & set(ELSEWHERE) or effect.equation:
         return
     mechanical = position is not None
     if wanted & {"position", "angle"} and not mechanical:
