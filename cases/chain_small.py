@@ -7,7 +7,7 @@ from suite.model import Initial, Input, Model, Output, Parameter
 
 def chain(n: int, outputs: tuple[int, ...]) -> Model:
     """Unit masses x1 ... xn, joined by springs k, damped by c, driven at the far end, held by the wall at x1."""
-    states = {}
+    states: dict[str, str] = {}
     for i in range(1, n + 1):
         left = f"-k*(x{i} - x{i - 1})" if i > 1 else "-k*x1"
         right = f" - k*(x{i} - x{i + 1})" if i < n else " + F"

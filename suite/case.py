@@ -93,8 +93,7 @@ class Case:
         t: Array = np.arange(round(experiment.duration / experiment.dt) + 1, dtype=np.float64) * experiment.dt
         u = np.array([[experiment.inputs[name](time) for name in self.deficient.inputs] for time in t])
         u = u.reshape(len(t), len(self.deficient.inputs))
-        x, d = self._run(t, u)
-        clean = np.array([self.truth.output(t[k], x[k], u[k]) for k in range(len(t))])
+        x, d, clean = self._run(t, u)
         spread = noise * clean.std(axis=0)
         y = clean + spread * np.random.default_rng(seed).standard_normal(clean.shape)
         for name, k in experiment.every.items():
@@ -111,23 +110,27 @@ class Case:
         places = {name: i for i, name in enumerate(self.truth.states)}
         return np.array([places[name] for name in self.deficient.states], dtype=np.int64)
 
-    def _run(self, t: Array, u: Array) -> tuple[Array, Array]:
-        """All states of the plant, (N, n), and the model error, (N, m), at the samples; integrated 20 times finer."""
+    def _run(self, t: Array, u: Array) -> tuple[Array, Array, Array]:
+        """All states of the plant, (N, n), the model error, (N, m), and the noise-free outputs at the samples.
+
+        The plant is integrated 20 times finer.
+        """
         assert self.truth is not None
         assert self.experiment is not None
         # A held case is the deficient model with a push in each rate that is renewed at every sample.
         mover = _pushed(self.deficient) if self.held else self.truth
         n, m = len(self.truth.states), len(self.deficient.states)
-        X, D = np.zeros((len(t), n)), np.zeros((len(t), m))
+        X, D, Y = (np.zeros((len(t), width)) for width in (n, m, len(self.truth.outputs)))
         X[0] = self.experiment.x0
         models = (self.truth, self.deficient, mover)
         pairs = [part for model in models for part in (model.program.rate, model.values)]
         none, inputs = np.zeros(0, dtype=np.int64), u.shape[1]
         work = plant_workspace(n, inputs, max(len(self.truth.parameters), len(mover.parameters)))
         part = plant_workspace(m, inputs, len(self.deficient.parameters))
-        held, linear = int(self.held), mover.linear_inputs
-        trajectory(*pairs, held, self._shared, t, u, linear, none, X, D, work, part)
-        return X, D
+        slopes = np.zeros((Y.shape[1], n)), np.zeros((Y.shape[1], len(self.truth.parameters)))
+        held, linear, sensors = int(self.held), mover.linear_inputs, self.truth.program.output
+        trajectory(sensors, *pairs, held, self._shared, t, u, linear, none, X, D, Y, *slopes, work, part)
+        return X, D, Y
 
 
 def _pushed(model: Model) -> Model:

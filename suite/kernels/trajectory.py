@@ -66,18 +66,20 @@ def march(rate: Any, t: float, dt: float, u0: Any, u1: Any, linear: Any, p: Any,
 
 @compile_kernel(
     nb.types.void(
-        nb.MODEL, nb.VECTOR, nb.MODEL, nb.VECTOR, nb.MODEL, nb.VECTOR, nb.INT, nb.INDICES,
-        nb.VECTOR, nb.MATRIX, nb.VECTOR, nb.INDICES, nb.MATRIX, nb.MATRIX, PLANT, PLANT,
+        nb.MODEL, nb.MODEL, nb.VECTOR, nb.MODEL, nb.VECTOR, nb.MODEL, nb.VECTOR, nb.INT, nb.INDICES,
+        nb.VECTOR, nb.MATRIX, nb.VECTOR, nb.INDICES, nb.MATRIX, nb.MATRIX, nb.MATRIX, nb.MATRIX, nb.MATRIX,
+        PLANT, PLANT,
     )
 )  # fmt: skip
 def trajectory(
-    truth: Any, p: Any, model: Any, q: Any, mover: Any, r: Any, held: int, shared: Any,
-    t: Any, u: Any, linear: Any, none: Any, X: Any, D: Any, work: Any, part: Any,
+    sensors: Any, truth: Any, p: Any, model: Any, q: Any, mover: Any, r: Any, held: int, shared: Any,
+    t: Any, u: Any, linear: Any, none: Any, X: Any, D: Any, Y: Any, Hx: Any, Hp: Any, work: Any, part: Any,
 ) -> None:  # fmt: skip
-    """X (N, n), whose first row is given, and D (N, m) = truth - model in the m shared states, by their places in X.
+    """X (N, n), whose first row is given; D (N, m) = truth - model in the m shared states, by their places in X;
+    Y (N, outputs), what the sensors (of the truth's parameters p) would read without noise.
 
     `mover` carries the state over each sample; with `held` the last of its parameters r are the push, set to D[k] at
-    each sample. Writes X, D, r, work (of the plant), part (of the model).
+    each sample. Writes X, D, Y, Hx, Hp, r, work (of the plant), part (of the model).
     """
     f, _, _, _, Fx, Fp = work
     g, z, _, _, Gx, Gp = part
@@ -86,6 +88,7 @@ def trajectory(
         for i in range(m):
             z[i] = X[k, shared[i]]
         truth(t[k], X[k], u[k], p, none, f, Fx, Fp)
+        sensors(t[k], X[k], u[k], p, none, Y[k], Hx, Hp)
         model(t[k], z, u[k], q, none, g, Gx, Gp)
         for i in range(m):
             D[k, i] = f[shared[i]] - g[i]
