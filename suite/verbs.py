@@ -163,7 +163,7 @@ def _say(found: Verdict) -> int:
 def add(args: argparse.Namespace) -> int:
     """Write the amended model and print the diff."""
     model = read_model(args.model)
-    effects = plugins.effects()
+    effects = plugins.effects() | {effect.id: effect for effect in model.effects}
     if args.effect not in effects:
         close = difflib.get_close_matches(args.effect, effects, 1)
         raise InputError(
@@ -198,8 +198,9 @@ def _chosen(model: Model, effect: str, equation: str | None) -> Term:
     places = [*model.states, *model.outputs, *model.inputs]
     if equation is not None and equation not in places:
         raise InputError(f"--equation {equation}: nothing is called that; the model has {', '.join(places)}")
-    every = candidates(model, {effect: plugins.effects()[effect]}, absolute=True)
-    terms = [t for t in every if equation in (None, t.equation)]
+    library = {name: item for name, item in plugins.effects().items() if name == effect}
+    every = candidates(model, library, absolute=True)
+    terms = [t for t in every if t.effect.id == effect and equation in (None, t.equation)]
     if not terms:
         where = f" in {equation}" if equation else ""
         raise InputError(

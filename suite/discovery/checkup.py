@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from suite import units
 from suite.discovery.engine import Problem
 from suite.discovery.fit import Hypothesis, covariance, homotopy, levenberg_marquardt, prepare
 from suite.discovery.identify import ALARM
@@ -35,6 +36,7 @@ def check(model: Model, record: Record) -> Checkup:
     findings: list[str] = []
     facts: dict[str, Any] = {"samples": len(record), "runs": len(record.starts)}
     facts["steps"] = _steps(record, findings)
+    units.check(model)
     facts["outputs"] = _outputs(model, record, findings)
     facts["inputs"] = _inputs(model, record, findings)
     problem = prepare(model, record)

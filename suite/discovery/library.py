@@ -194,7 +194,7 @@ def _bound(
     fresh = {name: names.fresh(name) for name in (*effect.coefficients, *effect.inner, *effect.states)}
 
     def written(text: str) -> str:
-        return re.sub(r"abs\(\(([^()]*)\)\)", r"abs(\1)", renamed(text, letters | fresh))
+        return re.sub(r"abs\(\(([^()]*)\)\)", r"abs(\1)", renamed(text, {**letters, **fresh}))
 
     return Term(
         effect,

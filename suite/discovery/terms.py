@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import sympy
@@ -12,7 +12,8 @@ import sympy
 from suite import expressions
 from suite.effect import Effect, Inner
 from suite.kernels import codegen
-from suite.model import Initial, Model, Parameter
+from suite.model import Hold, Initial, Model, Parameter
+from suite.units import brought
 
 Place = Literal["rate", "output", "input", "parameter", "clock"]
 CHANNELS = ("late", "slope", "tau", "held")  # what an input may look like besides its samples; see channels.py
@@ -74,14 +75,18 @@ class Term:
 
 
 def grown(model: Model, terms: Sequence[Term], numbers: Sequence[Mapping[str, Parameter]]) -> Model:
-    """The model with the terms added, their parameters and first values as in `numbers` under names that are free."""
-    for term, at in zip(terms, numbers, strict=True):
+    """The model with the terms added, their parameters and first values as in `numbers` under names that are free.
+
+    Where the model has units, what is new has its unit too.
+    """
+    units = [brought(term, model) for term in terms]
+    for term, at, unit in zip(terms, numbers, units, strict=True):
         names = _free(model, [*term.names, *term.states])
         kept = [n for n in term.names if n in term.counted]
-        parameters = {names[n]: at[n] for n in kept}
+        parameters = {names[n]: replace(at[n], unit=at[n].unit or unit[n]) for n in kept}
         if re.search(r"__(late|held)\b", term.text):
             entry = model.inputs[term.symbol]
-            held = "linear" if entry.hold == "previous" else "previous"
+            held: Hold = "linear" if entry.hold == "previous" else "previous"
             late = "__late" in term.text
             model = model.with_input(
                 term.symbol, parameters, delay=names[kept[0]] if late else None, hold=entry.hold if late else held
@@ -92,6 +97,8 @@ def grown(model: Model, terms: Sequence[Term], numbers: Sequence[Mapping[str, Pa
         initial = {names[z]: Initial(at[z].value, estimate=free) for z, (_, _, free) in term.states.items()}
         target = term.equation if term.place in ("rate", "output") else term.symbol
         model = model.plus(target, text, parameters, states, initial)
+        known = {names[z]: said for z in term.states if (said := unit[z])}
+        model = replace(model, units={**model.units, **known}) if known else model
     return model
 
 

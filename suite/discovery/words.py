@@ -60,8 +60,10 @@ def _several(verdict: Verdict) -> str:
 
 
 def effect(named: Named) -> str:
-    """'cubic_stiffness in x1 (-a*x2**3, a = 0.0195 +- 0.0004)'."""
-    numbers = ", ".join(f"{name} = {value_sd(c.value, c.sd)}" for name, c in named.coefficients.items())
+    """'cubic_stiffness in x1 (-a*x2**3, a = 0.0195 +- 0.0004 1/m^2/s^2)'."""
+    numbers = ", ".join(
+        f"{name} = {value_sd(c.value, c.sd)}{f' {c.unit}' if c.unit else ''}" for name, c in named.coefficients.items()
+    )
     return f"{named.effect} in {named.equation} ({named.term}, {numbers})"
 
 
