@@ -20,6 +20,7 @@ from suite.discovery.terms import grown
 from suite.effect import Effect
 from suite.model import Model, Parameter
 from suite.record import Record
+from suite.units import brought
 
 Array = npt.NDArray[np.float64]
 
@@ -152,8 +153,9 @@ def describe(problem: Problem, hypothesis: Hypothesis) -> list[Named]:
     named = []
     for k in hypothesis.active:
         term = problem.terms[k]
+        unit = brought(term, problem.model)
         coefficients = {
-            name: Coefficient(float(exact.point.p[j]), float(np.sqrt(max(V[place[j], place[j]], 0.0))))
+            name: Coefficient(float(exact.point.p[j]), float(np.sqrt(max(V[place[j], place[j]], 0.0))), unit[name])
             for name, j in zip(term.names, problem.places(k), strict=True)
             if name in term.counted
         }
