@@ -13,6 +13,7 @@ import math
 import re
 import warnings
 from collections.abc import Callable, Collection, Sequence
+from functools import lru_cache
 from typing import Any
 
 import sympy
@@ -73,6 +74,11 @@ def parse(text: str, names: Collection[str], where: str) -> sympy.Expr:
     """
     if not isinstance(text, str):
         raise ModelError(f"{where}: expected an equation as text, got {text!r}; put it in quotes")
+    return _parsed(text, frozenset(names), where)
+
+
+@lru_cache(maxsize=4096)  # models are rebuilt with other values far more often than with other equations
+def _parsed(text: str, names: frozenset[str], where: str) -> sympy.Expr:
     if len(text) > LONGEST:
         raise ModelError(f"{where}: the equation has {len(text)} characters, at most {LONGEST} are read; split it")
     if "#" in text:
@@ -91,7 +97,7 @@ def parse(text: str, names: Collection[str], where: str) -> sympy.Expr:
         reason = error.msg if isinstance(error, SyntaxError) else "it cannot be parsed"
         said = f"{_short(text)!r} is not an equation ({reason})"
         raise ModelError(f"{where}: {said}; check brackets and operators") from None
-    return _Translator(frozenset(names), where, line).visit(tree.body)
+    return _Translator(names, where, line).visit(tree.body)
 
 
 class _Plain(StrPrinter):  # type: ignore[misc]

@@ -24,6 +24,7 @@ Array = npt.NDArray[np.float64]
 
 EXACT = 0.01  # of the noise: what finer integration may still move
 FINEST = 16  # integration steps a sample that are tried; half of them are used
+RISEN = 50.0  # of the criterion: what a level may lie above the best before the levels between it and 0 are left out
 LEVELS = (10.0, 1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 0.0)
 
 
@@ -133,9 +134,13 @@ def homotopy(
 ) -> Hypothesis:
     """Fit at every level from `first` down to 0, each started where the last ended; the last one converged."""
     levels: list[Level] = []
+    lowest = np.inf
     for q in (level for level in LEVELS if level <= first):
         last = q == 0.0
+        if not last and levels and levels[-1].L > lowest + RISEN:
+            continue
         level = levenberg_marquardt(problem, point, q, active, 30 if last else 8, 1e-3 if last else tolerance)
+        lowest = min(lowest, level.L)
         if last and not np.isfinite(level.L) and levels:
             # The simulation left the finite numbers: keep the last level that did not.
             level = replace(levels[-1], q=0.0, L=np.inf)

@@ -22,6 +22,7 @@ from suite.discovery.terms import Term
 
 Array = npt.NDArray[np.float64]
 
+FEW = 16  # only every so many-th frequency is looked at where no tone is searched
 COLLINEAR = 1e-3  # a candidate whose column the parameters explain to this is that parameter
 
 
@@ -52,23 +53,23 @@ def score(problem: Problem, hypothesis: Hypothesis, skip: Iterable[int] = (), ex
         return []
     at = min(range(len(levels)), key=lambda i: levels[i].L)
     for level in [levels[-1]] if exact else levels[max(at - 1, 0) : at + 2]:
-        for entry in _scores_at(problem, hypothesis, level, left_out, exact or level is levels[at]):
+        for entry in _scores_at(problem, hypothesis, level, left_out, FEW if exact else int(level is levels[at])):
             if entry.k not in best or entry.LM > best[entry.k].LM:
                 best[entry.k] = entry
     return sorted(best.values(), key=lambda entry: -entry.LM)
 
 
 def _scores_at(
-    problem: Problem, hypothesis: Hypothesis, level: Level, left_out: set[int], tones: bool
+    problem: Problem, hypothesis: Hypothesis, level: Level, left_out: set[int], tones: int
 ) -> Iterable[Score]:
-    """The scores at one level, over the tries of the inner scales; tones over their frequencies."""
+    """The scores at one level, over the tries of the inner scales; tones over every `tones`-th frequency (0: none)."""
     plain = [k for k, term in enumerate(problem.terms) if k not in left_out and not is_tone(term)]
     most = max((len(i.tries) for k in plain for i in problem.terms[k].inner.values()), default=1)
     for number in range(most):
         chosen = plain if number == 0 else [k for k in plain if problem.terms[k].inner]
         yield from _score_pass(problem, hypothesis, level, chosen, partial(_with_inner, problem, number))
     repeating = [k for k, term in enumerate(problem.terms) if k not in left_out and is_tone(term)]
-    for omega in frequencies(problem) if tones and repeating else ():
+    for omega in frequencies(problem)[::tones] if tones and repeating else ():
         yield from _score_pass(problem, hypothesis, level, repeating, partial(_at_frequency, float(omega)))
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -110,17 +112,22 @@ def start_of(problem: Problem, term: Term) -> Array:
 def brought(problem: Problem, point: Point, k: int) -> Point:
     """The point with the first values of candidate k's states, from each run's first state, input and parameters."""
     term = problem.terms[k]
-    if not term.states:
+    if not any(start != "0" for _, start, _ in term.states.values()):
         return point
     model, record = problem.model, problem.record
-    names = [*model.states, *model.parameters, *model.inputs, *term.names, "t"]
+    names = (*model.states, *model.parameters, *model.inputs, *term.names, "t")
     x0 = point.x0.copy()
     count = len(model.parameters)
     for r, first in enumerate(record.starts):
         values = [*x0[r, : len(model.states)], *point.p[:count], *record.u[first], *point.p[problem.places(k)],
                   record.t[first]]  # fmt: skip
-        known = {expressions.symbol(name): float(value) for name, value in zip(names, values, strict=True)}
         for place, (_, text, _) in zip(problem.states(k), term.states.values(), strict=True):
-            parsed: sympy.Expr = expressions.parse(text, set(names), f"effect {term.effect.id}")
-            x0[r, place] = float(parsed.subs(known))
+            x0[r, place] = _function(text, names)(*values)
     return Point(x0, point.p)
+
+
+@lru_cache(maxsize=512)
+def _function(text: str, names: tuple[str, ...]) -> Callable[..., float]:
+    """A text as a function of the named values."""
+    expression = expressions.parse(text, set(names) - {expressions.TIME}, "first value of an added state")
+    return sympy.lambdify([expressions.symbol(name) for name in names], expression, "math")  # type: ignore[no-any-return]

@@ -15,7 +15,8 @@ import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -25,7 +26,7 @@ import sympy
 from numba.core.types.function_type import CompileResultWAP
 from sympy.printing.pycode import PythonCodePrinter
 
-from suite.expressions import symbol
+from suite.expressions import plain, symbol
 from suite.kernels import cache
 from suite.kernels.cache import numba
 from suite.kernels.types import MODEL, MODEL_FUNCTION
@@ -66,13 +67,13 @@ class Gate:
 class Program:
     """Compiled `rate(t, x, u, p, on, dx, Fx, Fp)` and `output(t, x, u, p, on, y, Hx, Hp)`.
 
-    Both write their last three arguments. Shapes: x (n,), u (inputs,), p (parameters,), on (gates,), Fx (n, n),
+    Both write their last three arguments, and of the derivatives only those that can differ from zero: the caller's
+    arrays start at zero and serve one program. Shapes: x (n,), u (inputs,), p (parameters,), on (gates,), Fx (n, n),
     Fp (n, parameters), Hx (outputs, n), Hp (outputs, parameters). Columns of Fp and Hp that belong to a gate are
     written only while it is on.
 
     on[k] is 0 while gate k is off, else 1; a gate that brings states along is switched on by the place of the first
-    of them in x, behind the program's own n, so that x holds the states of active gates only. What couples two gates'
-    states is never written: the caller's arrays start at zero.
+    of them in x, behind the program's own n, so that x holds the states of active gates only.
     """
 
     n: int
@@ -142,14 +143,21 @@ def compile_program(
 ) -> Program:
     """Compile rates and outputs (and gated terms) of the named states, inputs and parameters."""
     names = (tuple(states), tuple(inputs), tuple(parameters))
-    source = "\n\n".join(
-        [
-            HEADER,
-            _function("rate", "dx, Fx, Fp", rates, [(gate.rates, gate.states) for gate in gates], names, moving=True),
-            _function("output", "y, Hx, Hp", outputs, [(gate.outputs, gate.states) for gate in gates], names),
-        ]
-    )
-    module = _load(source)
+
+    def source() -> str:
+        moving = [(gate.rates, gate.states) for gate in gates]
+        reading = [(gate.outputs, gate.states) for gate in gates]
+        return "\n\n".join(
+            [
+                HEADER,
+                _function("rate", "dx, Fx, Fp", rates, moving, names, moving=True),
+                _function("output", "y, Hx, Hp", outputs, reading, names),
+            ]
+        )
+
+    parts = [[plain(e) for e in rates], [plain(e) for e in outputs]]
+    parts += [[f"{key} {plain(e)}" for p in (g.rates, g.outputs, g.states) for key, e in p.items()] for g in gates]
+    module = _load(repr((names, parts)), source)
     return Program(len(states), len(inputs), len(parameters), len(outputs), len(gates), module)
 
 
@@ -229,17 +237,12 @@ def _function(
     value, by_x, by_p = written.split(", ")
     X, U, P = ([symbol(s) for s in group] for group in names)
     own = _owned(P, base, [[*terms.values(), *states.values()] for terms, states in gated])
-    targets: dict[str, sympy.Expr] = {}
-    for i, expression in enumerate(base):
-        targets[f"{value}[{i}]"] = expression
-        targets |= {f"{by_x}[{i}, {j}]": _derivative(expression, s) for j, s in enumerate(X)}
-        targets |= {f"{by_p}[{i}, {j}]": _derivative(expression, s) for j, s in enumerate(P) if s not in own}
-    groups = zip("xup", (X, U, P), strict=True)
-    lines = [f"    s_{s} = {group}[{j}]" for group, part in groups for j, s in enumerate(part)]
-    lines += _assignments(targets, "=", "    ")
+    blocks: list[str] = []
+    touched: set[str] = set()
     for k, (terms, states) in enumerate(gated):
         added: dict[str, sympy.Expr] = {}
         fresh: dict[str, sympy.Expr] = {}
+        mine = [(j, s) for j, s in enumerate(P) if own.get(s) == k]
         # Where the gate's own states stand in x, and everything that it alone writes.
         places = [f"on[{k}] + {j}" if j else f"on[{k}]" for j in range(len(states))]
         brought = list(zip(map(symbol, states), places, strict=True))
@@ -247,22 +250,46 @@ def _function(
             added[f"{value}[{i}]"] = expression
             added |= {f"{by_x}[{i}, {j}]": _derivative(expression, s) for j, s in enumerate(X)}
             added |= {f"{by_p}[{i}, {j}]": _derivative(expression, s) for j, s in enumerate(P) if s not in own}
-        for i in range(len(base)):
-            part = terms.get(i, sympy.Integer(0))
-            fresh |= {f"{by_p}[{i}, {j}]": _derivative(part, s) for j, s in enumerate(P) if own.get(s) == k}
-            fresh |= {f"{by_x}[{i}, {place}]": _derivative(part, z) for z, place in brought}
+            fresh |= {f"{by_p}[{i}, {j}]": _derivative(expression, s) for j, s in mine}
+            fresh |= {f"{by_x}[{i}, {place}]": _derivative(expression, z) for z, place in brought}
         for place, rate in zip(places, states.values() if moving else (), strict=moving):
             fresh[f"{value}[{place}]"] = rate
             across = [*((s, str(j)) for j, s in enumerate(X)), *brought]
             fresh |= {f"{by_x}[{place}, {j}]": _derivative(rate, s) for s, j in across}
             fresh |= {f"{by_p}[{place}, {j}]": _derivative(rate, s) for j, s in enumerate(P) if rate.has(s)}
         added = {target: part for target, part in added.items() if part != 0}
+        fresh = {target: part for target, part in fresh.items() if part != 0 or target.startswith(f"{value}[")}
+        touched |= set(added)
         if added or fresh:
-            lines.append(f"    if on[{k}] != 0:")
-            lines += [f"        s_{z} = x[{place}]" for z, place in brought]
-            lines += _assignments(added, "+=", "        ") + _assignments(fresh, "=", "        ")
+            blocks.append(f"    if on[{k}] != 0:")
+            blocks += [f"        s_{s} = p[{j}]" for j, s in mine]
+            blocks += [f"        s_{z} = x[{place}]" for z, place in brought]
+            blocks += _assignments(added, "+=", "        ") + _assignments(fresh, "=", "        ")
+    targets: dict[str, sympy.Expr] = {}
+    for i, expression in enumerate(base):
+        targets[f"{value}[{i}]"] = expression
+        slopes = {f"{by_x}[{i}, {j}]": _derivative(expression, s) for j, s in enumerate(X)}
+        slopes |= {f"{by_p}[{i}, {j}]": _derivative(expression, s) for j, s in enumerate(P) if s not in own}
+        # What a gate adds to starts at zero; what nobody ever writes is zero as the caller made it.
+        targets |= {target: part for target, part in slopes.items() if part != 0 or target in touched}
+    shared = [s for s in P if s not in own]
+    lines = [f"    s_{s} = {g}[{j}]" for g, part in zip("xu", (X, U), strict=True) for j, s in enumerate(part)]
+    lines += [f"    s_{s} = p[{j}]" for j, s in enumerate(P) if s in _used(shared, base, gated)]
+    lines += _assignments(targets, "=", "    ")
+    lines += blocks
     head = f"@compile_kernel(MODEL_FUNCTION)\ndef {name}(t, x, u, p, on, {written}):"
     return "\n".join([head, *lines, "    return"])
+
+
+def _used(
+    shared: Sequence[sympy.Symbol],
+    base: Sequence[sympy.Expr],
+    gated: Sequence[tuple[Mapping[int, sympy.Expr], Mapping[str, sympy.Expr]]],
+) -> set[sympy.Basic]:
+    """The shared parameters that stand in anything at all."""
+    gates = [e for terms, states in gated for e in (*terms.values(), *states.values())]
+    free: set[sympy.Basic] = set().union(*(e.free_symbols for e in (*base, *gates)))
+    return free & set(shared)
 
 
 def _owned(
@@ -302,23 +329,34 @@ def _assignments(targets: Mapping[str, sympy.Expr], operator: str, indent: str) 
     return lines + [f"{indent}{t} {operator} {printer.doprint(e)}" for t, e in zip(targets, reduced, strict=True)]
 
 
-def _load(source: str) -> ModuleType:
-    """Import the generated text: from the cache folder as a real file (numba caches nothing else), or from memory."""
-    versions = f"{numba.__version__} {np.__version__} {sys.version}"
-    stem = "model_" + hashlib.sha256((source + versions).encode()).hexdigest()[:24]
+@lru_cache(maxsize=1)
+def _generator() -> str:
+    """A hash of this file: another generator writes other text for the same model."""
+    return hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
+
+
+def _load(key: str, source: Callable[[], str]) -> ModuleType:
+    """Import the generated text: from the cache folder as a real file (numba caches nothing else), or from memory.
+
+    The file is named by a hash of everything that its text follows from, the versions and the generator among them, so
+    that a known program is not even written anew.
+    """
+    versions = f"{numba.__version__} {np.__version__} {sympy.__version__} {sys.version} {_generator()}"
+    stem = "model_" + hashlib.sha256((key + versions).encode()).hexdigest()[:24]
     if stem in sys.modules:
         return sys.modules[stem]
     place = cache.folder()
     if place is None:
         module = ModuleType(stem)
-        linecache.cache[f"<{stem}>"] = (len(source), None, source.splitlines(True), f"<{stem}>")
-        exec(compile(source, f"<{stem}>", "exec"), module.__dict__)
+        text = source()
+        linecache.cache[f"<{stem}>"] = (len(text), None, text.splitlines(True), f"<{stem}>")
+        exec(compile(text, f"<{stem}>", "exec"), module.__dict__)
         sys.modules[stem] = module
         return module
     path = place / f"{stem}.py"
     if not path.exists():
         with tempfile.NamedTemporaryFile("w", dir=place, suffix=".tmp", delete=False, encoding="utf-8") as handle:
-            handle.write(source)
+            handle.write(source())
         os.replace(handle.name, path)
     spec = importlib.util.spec_from_file_location(stem, path)
     assert spec is not None
