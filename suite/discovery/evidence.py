@@ -11,7 +11,7 @@ import numpy.typing as npt
 from suite.discovery import state_map, whiteness
 from suite.discovery.discrepancy import discrepancy
 from suite.discovery.fit import prepare
-from suite.discovery.misfit import residual
+from suite.discovery.misfit import frozen, residual
 from suite.discovery.result import Comparison, Discrepancy
 from suite.discovery.variable import samples
 from suite.discovery.where import where
@@ -25,7 +25,8 @@ MOST = 2000  # points of a time series
 
 def evidence(model: Model, record: Record, compared: Comparison) -> dict[str, Any]:
     """The object `where` of `compare --json`; the model's parameters are taken as they are."""
-    problem = prepare(model, record)
+    # Nothing is fitted, so a record too short to determine the parameters will do.
+    problem = prepare(frozen(model), record)
     found = discrepancy(problem, problem.start)
     return to_json(model, record, compared, found)
 
