@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -146,3 +148,13 @@ def test_a_pattern_without_a_case_is_refused() -> None:
     """`--only` names what there is."""
     with pytest.raises(InputError, match="cooling-mug"):
         held_out.chosen("no such thing")
+
+
+def test_a_case_without_its_data_is_a_row_with_the_reason(tmp_path: Path) -> None:
+    """`bench measured` says where to get what is not there, in every file that it writes."""
+    asked = argparse.Namespace(only="emps", data=tmp_path, output=tmp_path / "out", json=False)
+    assert held_out.verb(asked) == 0
+    for name in ("measured.txt", "measured.csv", "measured.json"):
+        text = (tmp_path / "out" / name).read_text(encoding="utf-8")
+        assert "nonlinearbenchmark.org" in text
+        assert "sha256" in text

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import sys
 import time
 from collections.abc import Iterable, Mapping
@@ -131,6 +132,13 @@ def chosen(pattern: str | None) -> list[Case]:
     if not found:
         raise InputError(f"--only {pattern}: no such measured case; there are {', '.join(c.name for c in measured)}")
     return found
+
+
+def verb(args: argparse.Namespace) -> int:
+    """`bench measured`: judge, write, and show the table (or JSON alone); 0 done, 2 by InputError."""
+    rows = run(args.only, args.data, args.output)
+    print(table.to_json(rows) if args.json else text(rows))
+    return 0
 
 
 def run(pattern: str | None, folder: Path | None, output: Path | None) -> list[dict[str, Any]]:
