@@ -9,6 +9,5 @@ EFFECT = Effect(
     sentence="A loss grows with some power of the state that no simple law gives.",
     dimension="state^(1-w)/time",
     inner={"w": Inner("one", 1.5, 0.3, 4.0, (1.0, 0.4, 2.0))},
-    family="the loss is a power of the state",
     generic=True,
 )

@@ -26,7 +26,7 @@ def acting(record: Record, model: Model) -> Record:
 
 
 def late(record: Record, j: int, delay: float) -> tuple[Array, Array]:
-    """Input j as it was `delay` before each sample, and its slope there, (N,) each; before a run it was as at its start.
+    """Input j as it was `delay` before each sample, and its slope there, (N,) each; before a run it was as at first.
 
     Between samples it runs on a line. For an input that is held this is the mean over a step of the delayed staircase.
     """

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -202,15 +202,17 @@ class Model:
         parameters: Mapping[str, Parameter] = MappingProxyType({}),
         states: Mapping[str, str] = MappingProxyType({}),
         initial: Mapping[str, Initial] = MappingProxyType({}),
+        measured: bool = False,
     ) -> Model:
         """The model with `term` (text that opens with its sign) added to a state's rate or to an output; to an input
         or a parameter wherever that stands; or (`place` is t, a clock that runs wrong) times every rate to every rate.
 
-        `states` come along, with their rates and `initial` values; they are not in doubt.
+        `states` come along, with their rates and `initial` values; they are not in doubt. `measured`: the place is an
+        output, also where a state has its name.
         """
         rates = dict(self.states)
         texts = {name: output.equation for name, output in self.outputs.items()}
-        if place in rates:
+        if place in rates and not measured:
             rates[place] = f"{rates[place]} {_signed(term)}"
         elif place in texts:
             texts[place] = f"{texts[place]} {_signed(term)}"
@@ -236,9 +238,7 @@ class Model:
     def with_input(self, name: str, parameters: Mapping[str, Parameter], delay: str | None, hold: Hold) -> Model:
         """The model with an input that acts later, by the parameter `delay`, or is held otherwise between samples."""
         changed = replace(self.inputs[name], hold=hold, delay=delay or self.inputs[name].delay)
-        return replace(
-            self, inputs={**self.inputs, name: changed}, parameters={**self.parameters, **parameters}
-        )
+        return replace(self, inputs={**self.inputs, name: changed}, parameters={**self.parameters, **parameters})
 
     def with_values(self, values: Mapping[str, float]) -> Model:
         """The model with other parameter values; everything known about them stays."""

@@ -9,16 +9,16 @@ import numpy as np
 import numpy.typing as npt
 
 from suite import units
+from suite.discovery import determined
 from suite.discovery.engine import Problem
-from suite.discovery.fit import Hypothesis, covariance, homotopy, levenberg_marquardt, prepare
+from suite.discovery.fit import Hypothesis, homotopy, levenberg_marquardt, prepare
 from suite.discovery.identify import ALARM
-from suite.discovery.noise import noise_variance
+from suite.discovery.noise import OUTLIER, noise_variance, spikes
 from suite.model import Hold, Model
 from suite.record import Record
 
 Array = npt.NDArray[np.float64]
 
-OUTLIER = 6.0  # robust standard deviations of a sample's jump
 UNEVEN = 0.01  # relative variation of the steps from which sampling counts as irregular
 LATEST = 5  # samples of input delay that are tried
 
@@ -41,7 +41,9 @@ def check(model: Model, record: Record) -> Checkup:
     facts["inputs"] = _inputs(model, record, findings)
     problem = prepare(model, record)
     level = homotopy(problem, problem.start)
-    facts["undetermined"] = _undetermined(problem, level.exact if np.isfinite(level.exact.L) else level.best, findings)
+    at = level.exact if np.isfinite(level.exact.L) else level.best
+    facts["undetermined"] = determined.facts(problem, at, level.layout)
+    findings += determined.findings(problem, at, level.layout)
     if model.inputs:
         _holds(problem, level, findings)
     facts["input_delay"] = _delays(problem, level.exact.point, findings) if model.inputs else {}
@@ -71,7 +73,7 @@ def _outputs(model: Model, record: Record, findings: list[str]) -> dict[str, Any
             findings.append(f"{name} never changes; nothing can be learned from it.")
         changes = np.diff(y[there]) if there.sum() > 1 else np.zeros(1)
         typical = max(1.4826 * float(np.median(np.abs(changes - np.median(changes)))), 1e-300)
-        outliers = int(_spikes(y[there], max(float(sigma[j]), 0.2 * typical)).sum())
+        outliers = int(spikes(y[there], max(float(sigma[j]), 0.2 * typical)).sum())
         levels = len(np.unique(y[there]))
         facts[name] = {
             "noise": float(sigma[j]), "given": output.sigma is not None, "range": span,
@@ -105,16 +107,6 @@ def _outputs(model: Model, record: Record, findings: list[str]) -> dict[str, Any
     return facts
 
 
-def _spikes(y: Array, sigma: float) -> npt.NDArray[np.bool_]:
-    """Single samples that stand out from the median of their five neighbours."""
-    if len(y) < 7:
-        return np.zeros(len(y), dtype=bool)
-    padded = np.pad(y, 2, mode="reflect")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 5)
-    reach = np.sort(np.abs(windows - np.median(windows, axis=1)[:, None]), axis=1)[:, 3]
-    return np.asarray(np.abs(y - np.median(windows, axis=1)) > OUTLIER * np.maximum(sigma, reach))
-
-
 def _inputs(model: Model, record: Record, findings: list[str]) -> dict[str, Any]:
     facts = {}
     for j, name in enumerate(model.inputs):
@@ -124,40 +116,6 @@ def _inputs(model: Model, record: Record, findings: list[str]) -> dict[str, Any]
         if span == 0.0:
             findings.append(f"Input {name} is constant: nothing that depends on how it acts can be told from a bias.")
     return facts
-
-
-def _undetermined(problem: Problem, level: Any, findings: list[str]) -> dict[str, Any]:
-    """Parameters and initial states that the data alone do not fix: null directions of the scaled sensitivities."""
-    columns = problem.columns(())
-    runs = len(problem.start.x0)
-    states = [name for name, free in zip(problem.model.states, problem.free_x0, strict=True) if free]
-    labels = [f"first {name}" + (f" of run {r + 1}" if runs > 1 else "") for r in range(runs) for name in states]
-    labels += [problem.names[j] for j in columns]
-    if not labels:
-        return {"directions": [], "sd": {}}
-    J = level.passed.J
-    norms = np.sqrt((J**2).sum(axis=0))
-    dead = [labels[i] for i in np.flatnonzero(norms <= 1e-12 * max(float(norms.max()), 1e-300))]
-    scaled = J / np.where(norms > 0, norms, 1.0)
-    _, singular, Vt = np.linalg.svd(scaled, full_matrices=False)
-    directions = []
-    for value, direction in zip(singular, Vt, strict=True):
-        if value < 1e-6 * singular[0]:
-            members = [labels[i] for i in np.flatnonzero(np.abs(direction) > 0.2)]
-            directions.append(members)
-            if not set(members) <= set(dead):
-                findings.append(
-                    f"Only a combination of {', '.join(members)} acts on the data; fix all but one of them."
-                )
-    for name in dead:
-        findings.append(f"{name} has no effect on what is measured; fix it or measure more.")
-    free = replace(problem, scale=problem.noise(level.passed))
-    sds = np.sqrt(np.maximum(np.diag(covariance(free, level, columns)), 0.0))[len(labels) - len(columns) :]
-    for j, sd in zip(columns, sds, strict=True):
-        value = abs(float(level.point.p[j]))
-        if value and sd > 0.5 * value and problem.names[j] not in dead:
-            findings.append(f"{problem.names[j]} is known to {100 * sd / value:.0f} % only after these data.")
-    return {"directions": directions, "sd": dict(zip([problem.names[j] for j in columns], sds.tolist(), strict=True))}
 
 
 def _holds(problem: Problem, level: Hypothesis, findings: list[str]) -> None:

@@ -30,7 +30,7 @@ Index = npt.NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Point:
-    """Where a hypothesis stands: x0 (runs, n + states of all candidates) and p (all parameters, the candidates' too)."""
+    """Where a hypothesis stands: x0 (runs, n + the candidates' states) and p (all parameters, the candidates' too)."""
 
     x0: Array
     p: Array
@@ -77,6 +77,7 @@ class Problem:
     frozen: bool = False  # fits move initial states only
     scale: float | None = None  # the noise's variance in units of R, where it is known and not profiled
     dropped: int = 0  # samples left out as outliers
+    colour: Array | None = None  # memory of each output's noise from sample to sample, (outputs,); None: white
 
     @cached_property
     def _extension(self) -> tuple[tuple[str, ...], tuple[codegen.Gate, ...]]:
@@ -104,6 +105,10 @@ class Problem:
             gates=[gate.through(act) for gate in self._extension[1]],
         )
 
+    def label(self, j: int) -> str:
+        """What people call parameter j: a candidate's without the number of its gate."""
+        return self.names[j].split("__", 1)[-1]
+
     def _acting(self, expression: codegen.Expr) -> codegen.Expr:
         """The expression with the inputs that the model itself delays as they act."""
         for name, entry in self.model.inputs.items():
@@ -116,7 +121,9 @@ class Problem:
     def _late(self) -> dict[int, int]:
         """The parameter that each delayed input is delayed by, by the input's number."""
         names = list(self.model.inputs)
-        own = {j: list(self.model.parameters).index(e.delay) for j, e in enumerate(self.model.inputs.values()) if e.delay}
+        own = {
+            j: list(self.model.parameters).index(e.delay) for j, e in enumerate(self.model.inputs.values()) if e.delay
+        }
         offered = {
             names.index(term.symbol): self.places(k)[0] for k, term in enumerate(self.terms) if "__late" in term.text
         }
@@ -287,7 +294,28 @@ class Problem:
         with np.errstate(invalid="ignore", divide="ignore"):
             logs = float(np.log(s[seen]).sum())
         finite = failed < 0 and bool(np.isfinite(e).all())
+        if self.colour is not None and q == 0.0 and finite:
+            e, J = self.whitened(e), self.whitened(J)
+            logs += float((seen.sum(axis=0) * np.log(1.0 - self.colour**2)).sum())
         return Pass(e[seen], self._scatter(J, at), logs, self._turned(Y), X, finite)
+
+    def whitened(self, e: Array) -> Array:
+        """Errors (N, outputs) or their Jacobian (N, outputs, theta) less what the noise remembers, in its own units."""
+        if self.colour is None:
+            return e
+        shape = (-1,) + (1,) * (e.ndim - 2)
+        rho, left = self.colour.reshape(shape), np.sqrt(1.0 - self.colour**2).reshape(shape)
+        before = np.zeros_like(e)
+        before[1:] = np.where(self.seen[:-1].reshape(len(e) - 1, *self.seen.shape[1:], *shape[1:]), e[:-1], 0.0)
+        known = np.zeros(self.seen.shape, dtype=bool)
+        known[1:] = self.seen[:-1]
+        known[list(self.record.starts)] = False
+        known = known.reshape(*self.seen.shape, *shape[1:])
+        return np.where(known, (e - rho * before) / left, e)
+
+    def coloured(self, rho: Array) -> Problem:
+        """The same problem with sensors whose noise remembers."""
+        return self.on(self.record, self.start, colour=rho)
 
     def _turned(self, Y: Array) -> Array:
         """Simulated angles in the turn of their measurement."""

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from suite.discovery.engine import Index, Layout, Pass, Point, Problem
-from suite.discovery.noise import noise_variance
+from suite.discovery.noise import noise_variance, without_outliers
 from suite.discovery.starts import brought, check_record, first_states, pace_of, rough_path, start_of
 from suite.discovery.terms import Term
 from suite.model import Model
@@ -137,7 +137,7 @@ def homotopy(
     lowest = np.inf
     for q in (level for level in LEVELS if level <= first):
         last = q == 0.0
-        if not last and levels and levels[-1].L > lowest + RISEN:
+        if not last and levels and lowest + RISEN < levels[-1].L:
             continue
         level = levenberg_marquardt(problem, point, q, active, 30 if last else 8, 1e-3 if last else tolerance)
         lowest = min(lowest, level.L)
@@ -176,9 +176,10 @@ def covariance(problem: Problem, level: Level, columns: Index) -> Array:
 def prepare(model: Model, record: Record, terms: tuple[Term, ...] = ()) -> Problem:
     """The problem of a model beside a record: noise, a start for the initial states, weights of the process noise."""
     check_record(model, record)
+    record, dropped = without_outliers(model, record)
     R = noise_variance(model, record)
     x0, free = first_states(model, record)
-    problem = Problem(model, record, (), R, Point(x0, model.values), free, np.zeros(len(model.states)))
+    problem = Problem(model, record, (), R, Point(x0, model.values), free, np.zeros(len(model.states)), dropped=dropped)
     # The path decides the weights, the weights the path: two rounds settle it.
     path = rough_path(problem)
     for _ in range(2):

@@ -9,8 +9,9 @@ from suite.discovery import misfit
 from suite.discovery.discrepancy import discrepancy
 from suite.discovery.fit import Hypothesis, summarise
 from suite.discovery.identify import Search
+from suite.discovery.outcome import amended
 from suite.discovery.result import Ledger, Step, Verdict
-from suite.discovery.verdict import amended, investigate, judge
+from suite.discovery.verdict import investigate, judge
 from suite.discovery.where import where
 from suite.discovery.whiteness import whiteness
 from suite.discovery.words import headline

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 
@@ -10,6 +12,8 @@ from suite.record import Record
 
 Array = npt.NDArray[np.float64]
 
+OUTLIER = 6.0  # robust standard deviations by which a sample stands out from its neighbours
+MOST = 0.05  # of an output's samples: where more than that stand out, they are no outliers
 QUIETEST = 1e-7  # of an output's range: below it the integrator, not the sensor, makes the error
 
 
@@ -66,3 +70,33 @@ def _innovation(t: Array, y: Array) -> Array:
     steps[:, np.arange(5), np.arange(5)] = 1.0
     weights = 1.0 / steps.prod(axis=2)
     return np.asarray((weights * values).sum(axis=1) ** 2 / (weights**2).sum(axis=1))
+
+
+def spikes(y: Array, sigma: float) -> npt.NDArray[np.bool_]:
+    """Single samples that stand out from the median of their five neighbours."""
+    if len(y) < 7:
+        return np.zeros(len(y), dtype=bool)
+    padded = np.pad(y, 2, mode="reflect")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 5)
+    reach = np.sort(np.abs(windows - np.median(windows, axis=1)[:, None]), axis=1)[:, 3]
+    return np.asarray(np.abs(y - np.median(windows, axis=1)) > OUTLIER * np.maximum(sigma, reach))
+
+
+def without_outliers(model: Model, record: Record) -> tuple[Record, int]:
+    """The record with the samples that stand out alone marked as missing, and how many there are.
+
+    One that stands out beside another is not taken for an outlier: the plant itself may have moved.
+    """
+    y = record.y.copy()
+    sigma = np.sqrt(noise_variance(model, record))
+    dropped = 0
+    for first, last in zip(record.bounds[:-1], record.bounds[1:], strict=True):
+        for j, output in enumerate(model.outputs.values()):
+            values = unrolled(record.part(first, last), j, output.angle)
+            there = np.flatnonzero(~np.isnan(values))
+            found = spikes(values[there], max(float(sigma[j]), 1e-300))
+            alone = found & ~np.roll(found, 1) & ~np.roll(found, -1)
+            if 0 < alone.sum() <= MOST * len(there):
+                y[first + there[alone], j] = np.nan
+                dropped += int(alone.sum())
+    return (replace(record, y=y), dropped) if dropped else (record, 0)

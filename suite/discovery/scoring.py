@@ -188,7 +188,10 @@ def pairs(problem: Problem, base: Hypothesis, scores: Sequence[Score], most: int
         ranked.append((solved[1] - price * counted, first, second, solved[0]))
     ranked.sort(key=lambda entry: -entry[0])
     return [
-        (_half(problem, found, first, c, 0, level.q), _half(problem, found, second, c, found.b[first].shape[1], level.q))
+        (
+            _half(problem, found, first, c, 0, level.q),
+            _half(problem, found, second, c, found.b[first].shape[1], level.q),
+        )
         for _, first, second, c in ranked[:most]
     ]
 

@@ -96,7 +96,7 @@ def grown(model: Model, terms: Sequence[Term], numbers: Sequence[Mapping[str, Pa
         states = {names[z]: _renamed(rate, names) for z, (rate, _, _) in term.states.items()}
         initial = {names[z]: Initial(at[z].value, estimate=free) for z, (_, _, free) in term.states.items()}
         target = term.equation if term.place in ("rate", "output") else term.symbol
-        model = model.plus(target, text, parameters, states, initial)
+        model = model.plus(target, text, parameters, states, initial, measured=term.place == "output")
         known = {names[z]: said for z in term.states if (said := unit[z])}
         model = replace(model, units={**model.units, **known}) if known else model
     return model

@@ -77,6 +77,19 @@ def value_sd(value: float, sd: float) -> str:
     return f"{value:.{digits}g} +- {sd:.2g}"
 
 
+def colour(names: Sequence[str], rho: Sequence[float]) -> str:
+    """That the sensors' noise has a memory."""
+    parts = ", ".join(f"{value:.2f} ({name})" for name, value in zip(names, rho, strict=True))
+    return f"The sensor noise has a memory from sample to sample, {parts}; the weights take that into account."
+
+
+def outliers(count: int) -> str:
+    """What was done about samples that stand out."""
+    if count == 1:
+        return "One sample stands out from its neighbours like an outlier and was left out."
+    return f"{count} samples stand out from their neighbours like outliers and were left out."
+
+
 def separate(best: Sequence[str], rival: Sequence[str], apart: float, times: str) -> str:
     """What it would take to tell two hypotheses apart."""
     return (
@@ -123,8 +136,9 @@ def _moved(verdict: Verdict) -> str:
 
 
 def _family(verdict: Verdict, problem: Problem) -> str:
-    """What all plausible effects share, if they do."""
+    """What all plausible effects share, if they do; shapes that stand for nothing in particular have no say."""
     families = {term.effect.id: term.effect.family for term in problem.terms}
-    shared = [{families[named.effect] for named in candidate.effects} for candidate in verdict.plausible]
+    shared = [{families[named.effect] for named in candidate.effects} - {""} for candidate in verdict.plausible]
+    shared = [family for family in shared if family]
     common = set.intersection(*shared) if shared else set()
     return next((re.sub(r"\s+", " ", text) for text in sorted(common) if text), "")

@@ -1,0 +1,133 @@
+"""What a hypothesis says once it is chosen: coefficients, parameters, the amended model, errors before and after."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from suite.discovery import misfit
+from suite.discovery.engine import Point, Problem
+from suite.discovery.fit import Hypothesis, Level, covariance, homotopy, summarise
+from suite.discovery.hold_out import Split, split
+from suite.discovery.identify import Search
+from suite.discovery.result import Coefficient, Named
+from suite.discovery.terms import grown
+from suite.model import Model, Parameter
+from suite.units import brought
+
+Array = npt.NDArray[np.float64]
+
+
+def residual(problem: Problem, level: Level) -> Array:
+    """Measured minus simulated in noise units, (N, outputs)."""
+    residual = (problem.record.y - level.passed.Y) / np.sqrt(problem.R)
+    wrapped = np.arctan2(np.sin(problem.record.y - level.passed.Y), np.cos(problem.record.y - level.passed.Y))
+    return np.where(problem.angles > 0, wrapped / np.sqrt(problem.R), residual)
+
+
+def describe(problem: Problem, hypothesis: Hypothesis) -> list[Named]:
+    """The effects of a hypothesis with their fitted coefficients and standard deviations."""
+    exact = hypothesis.exact
+    if not hypothesis.active or not exact.passed.finite:
+        return []
+    V = covariance(problem, exact, hypothesis.columns)
+    edge = V.shape[0] - len(hypothesis.columns)
+    place = {int(j): edge + i for i, j in enumerate(hypothesis.columns)}
+    named = []
+    for k in hypothesis.active:
+        term = problem.terms[k]
+        unit = brought(term, problem.model)
+        coefficients = {
+            name: Coefficient(float(exact.point.p[j]), float(np.sqrt(max(V[place[j], place[j]], 0.0))), unit[name])
+            for name, j in zip(term.names, problem.places(k), strict=True)
+            if name in term.counted
+        }
+        named.append(Named(term.effect.id, term.equation, term.shown, coefficients))
+    return named
+
+
+def parameters(problem: Problem, hypothesis: Hypothesis) -> dict[str, dict[str, float]]:
+    """Each of the model's parameters before and after the fit, with its standard deviation."""
+    fitted = summarise(problem, hypothesis)
+    return {
+        name: {"before": p.value, "value": fitted.parameters[name][0], "sd": fitted.parameters[name][1]}
+        for name, p in problem.model.parameters.items()
+    }
+
+
+def amended(problem: Problem, hypothesis: Hypothesis, fitted: bool = True) -> Model:
+    """The model with the hypothesis' terms added at their fitted coefficients and bounds.
+
+    Its own parameters stand at their fitted values, or (not `fitted`) at the file's, where what is known of them holds.
+    """
+    point = hypothesis.exact.point
+    low, high = problem.limits
+    model = summarise(problem, hypothesis).model if fitted else problem.model
+    terms = [problem.terms[k] for k in hypothesis.active]
+    numbers = [
+        {name: Parameter(float(point.p[j]), free=True, bounds=(float(low[j]), float(high[j])))
+         for name, j in zip(term.names, problem.places(k), strict=True)}
+        | {name: Parameter(float(point.x0[0, j])) for name, j in zip(term.states, problem.states(k), strict=True)}
+        for k, term in zip(hypothesis.active, terms, strict=True)
+    ]  # fmt: skip
+    return grown(model, terms, numbers)
+
+
+def curve(problem: Problem, base: Hypothesis, hypothesis: Hypothesis, equation: str) -> Array | None:
+    """What the hypothesis adds to a rate of the calibrated base model along its own path, (N,); None for an effect
+    outside the equations of motion.
+    """
+    if equation not in problem.model.states:
+        return None
+    i = list(problem.model.states).index(equation)
+    program, record = problem.program, problem.record
+    n, m = len(hypothesis.layout.states), program.parameters
+    f, Fx, Fp = np.zeros(n), np.zeros((n, n)), np.zeros((n, m))
+    added = np.zeros(len(record))
+    u = problem.inputs(hypothesis.exact.point.p)
+    for k, x in enumerate(hypothesis.exact.passed.X):
+        program.rate(record.t[k], x, u[k], hypothesis.exact.point.p, hypothesis.layout.on, f, Fx, Fp)
+        added[k] = f[i]
+        program.rate(record.t[k], x, u[k], base.exact.point.p, base.layout.on, f, Fx, Fp)
+        added[k] -= f[i]
+    return added
+
+
+def errors(found: Search, named: Hypothesis) -> dict[str, Any]:
+    """Errors of the calibrated base model and of the named one, the noise, and free-run errors on held-out data."""
+    problem = found.problem
+    names = list(problem.model.outputs)
+    before = misfit.rmse(problem.record, found.base.exact.passed.Y, names)
+    after = misfit.rmse(problem.record, named.exact.passed.Y, names)
+    noise = dict(zip(names, np.sqrt(problem.R).tolist(), strict=True))
+    error: dict[str, Any] = {"before": before, "after": after, "noise": noise}
+    parts = split(problem.record)
+    if parts is None:
+        return error
+    held: dict[str, dict[str, float]] = {}
+    for label, hypothesis in (("before", found.base), ("after", named)):
+        held[label] = held_out(problem, hypothesis, parts)
+    return {**error, "held_out": held}
+
+
+def held_out(problem: Problem, hypothesis: Hypothesis, parts: Split) -> dict[str, float]:
+    """Free-run error on what is held out, of the same structure fitted to the training part alone.
+
+    The fit starts from the file's parameters and from the coefficients found; a run of its own then has its unknown
+    first state fitted, with all parameters fixed.
+    """
+    runs = len(parts.train.starts)
+    p = problem.start.p.copy()
+    for k in hypothesis.active:
+        p[problem.places(k)] = hypothesis.exact.point.p[problem.places(k)]
+    x0 = hypothesis.exact.point.x0[:runs]
+    train = problem.on(parts.train, Point(x0, problem.start.p))
+    point = homotopy(train, Point(x0, p), hypothesis.active, first=0.1).exact.point
+    judged = problem.on(parts.judged, problem.start, frozen=True)
+    if parts.first == 0:
+        start = Point(hypothesis.exact.point.x0[-1:], point.p)
+        point = homotopy(judged, start, hypothesis.active, first=0.1).exact.point if problem.free_x0.any() else start
+    Y = judged.run(point, 0.0, judged.layout(hypothesis.active)).Y
+    return misfit.rmse(parts.judged, Y, list(problem.model.outputs), slice(parts.first, None))

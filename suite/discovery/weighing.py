@@ -1,0 +1,144 @@
+"""Weights: how likely each hypothesis is, which of them are one and the same on these data, and what kind of verdict
+that makes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from suite.discovery.engine import Problem
+from suite.discovery.fit import Hypothesis, Level
+from suite.discovery.identify import ALARM, Search, needs_more
+from suite.discovery.result import Kind
+
+SURE = 0.9  # weight from which a verdict names one effect
+REMAINS = 0.15  # of the error beyond the noise: what may remain for an effect to count as found, though not alone
+ODDS = 4.6  # of the criterion: an effect that no alarm calls for must be ten times likelier than none, 2 ln 10
+DECISIVE = 10.0  # of the criterion: what a further effect must gain where the residual does not become white
+SAME = 0.05  # squared distance of two simulations, in noise units, below which no data could tell them apart
+
+
+@dataclass(frozen=True, eq=False)
+class Weighed:
+    """One hypothesis with its share of the weight and its criterion; `twins` give the same output on these data."""
+
+    hypothesis: Hypothesis
+    weight: float
+    criterion: float
+    twins: tuple[Hypothesis, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Weighing:
+    """All hypotheses, best first; `settled` says that the best leaves nothing but noise."""
+
+    ranked: tuple[Weighed, ...]
+    settled: bool
+
+    @property
+    def best(self) -> Weighed:
+        """The likeliest."""
+        return self.ranked[0]
+
+
+def weigh(found: Search) -> Weighing:
+    """Weights ~ exp(-EBIC/2), twins merged; where something remains, compared with it as process noise."""
+    everything = [found.base, *found.fitted]
+    settled = not needs_more(found, min(everything, key=found.criterion))
+    if not settled:
+        everything = _thrifty(found, everything)
+    values = [found.criterion(h, h.exact if settled else h.best) for h in everything]
+    order = np.argsort(values, kind="stable")
+    weights = np.exp(-0.5 * (np.array(values) - np.nanmin(values)))
+    weights = np.where(np.isfinite(weights), weights, 0.0) / np.nansum(weights)
+    if not settled:
+        weights = weights * _told(everything[order[0]])
+    groups: list[list[int]] = []
+    for i in order:
+        home = next((g for g in groups if same(found.problem, everything[g[0]], everything[i])), None)
+        if home is None:
+            groups.append([int(i)])
+        else:
+            home.append(int(i))
+    ranked = [_merged(found, [everything[i] for i in g], [values[i] for i in g], weights[g].tolist()) for g in groups]
+    return Weighing(tuple(sorted(ranked, key=lambda entry: -entry.weight)), settled)
+
+
+def same(problem: Problem, one: Hypothesis, other: Hypothesis) -> bool:
+    """Whether two hypotheses give the same output on these data, and neither is simply the other with a part unused."""
+    a, b = one.exact.passed, other.exact.passed
+    if not (a.finite and b.finite and one.active and other.active):
+        return False
+    gap = ((a.Y - b.Y) ** 2 / problem.R)[problem.seen].sum() / problem.noise(a)
+    return bool(gap < SAME)
+
+
+def _merged(found: Search, members: list[Hypothesis], values: list[float], weights: list[float]) -> Weighed:
+    """One entry for hypotheses that are the same: physics before generic shapes, then the best criterion."""
+    terms = found.problem.terms
+
+    def order(i: int) -> tuple[int, float]:
+        return sum(terms[k].effect.generic for k in members[i].active), values[i]
+
+    fewest = min(size(found.problem, h) for h in members)
+    simple = [i for i, h in enumerate(members) if size(found.problem, h) == fewest]
+    first = min(simple, key=order)
+    twins = tuple(members[i] for i in simple if i != first)
+    return Weighed(members[first], float(sum(weights)), values[first], twins)
+
+
+def size(problem: Problem, hypothesis: Hypothesis) -> int:
+    """How many parameters a hypothesis has of its own."""
+    return sum(len(problem.terms[k].counted) for k in hypothesis.active)
+
+
+def kind(found: Search, weighing: Weighing) -> Kind:
+    """Adequate: the base model is best and nothing remains. Unexplained: something remains that the library barely
+    touches. Ambiguous: no hypothesis has the weight, or the best leaves part of the error, or has a twin that is
+    physics too.
+    """
+    base, best = found.base, weighing.best.hypothesis
+    if best is base:
+        return "adequate" if weighing.settled else "unexplained"
+    if base.gain <= ALARM and found.criterion(base) - found.criterion(best) < ODDS:
+        # No alarm, and an effect only just pays for itself: what chance gives to one of many candidates.
+        return "adequate"
+    if not weighing.settled:
+        before, after = excess(found.problem, base.exact), excess(found.problem, best.exact)
+        return "ambiguous" if after < REMAINS * before else "unexplained"
+    physics = [h for h in weighing.best.twins if not any(found.problem.terms[k].effect.generic for k in h.active)]
+    return "missing_effect" if weighing.best.weight >= SURE and not physics else "ambiguous"
+
+
+def excess(problem: Problem, level: Level) -> float:
+    """Error beyond the noise, as a multiple of the noise's standard deviation."""
+    if not level.passed.finite:
+        return np.inf
+    return float(np.sqrt(max(float(np.mean(level.passed.e**2)) - 1.0, 0.0)))
+
+
+def _thrifty(found: Search, everything: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Where something remains whatever is added, a further effect must earn its place: by DECISIVE over its subsets.
+
+    What is left then counts as process noise, alike for all, before hypotheses are compared.
+    """
+
+    def value(hypothesis: Hypothesis) -> float:
+        return found.criterion(hypothesis, hypothesis.best)
+
+    return [
+        h for h in everything
+        if not any(set(s.active) < set(h.active) and value(s) < value(h) + DECISIVE for s in everything)
+    ]  # fmt: skip
+
+
+def _told(best: Hypothesis) -> float:
+    """The share of the best one's residual variance that is noise. The rest goes to what is not in the library: a
+    hypothesis that leaves a structure cannot be the whole truth, however far ahead of its rivals it is.
+    """
+    if not best.exact.passed.finite:
+        return 0.0
+    return min(1.0, 1.0 / max(float(np.mean(best.exact.passed.e**2)), 1e-12))
