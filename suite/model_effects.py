@@ -81,6 +81,8 @@ class _Table:
         for name in own if "late" not in roles.values() else ():
             if name not in used:
                 raise self.refuse("", f"{name} stands nowhere in the term", f"use {name} in it, or leave {name} out")
+        if "late" not in roles.values():
+            self.vanishes(term, coefficients, known)
         sign = table.get("sign", 0)
         if isinstance(sign, bool) or sign not in (0, 1):
             raise self.refuse(
@@ -102,6 +104,14 @@ class _Table:
             generic=document.flag(self.place, table, "generic"),
             equation=equation,
         )
+
+    def vanishes(self, term: str, coefficients: Sequence[str], known: Collection[str]) -> None:
+        """Without its coefficients an effect is not there: the search starts from zero."""
+        without = expressions.parse(term, known, self.place).subs({expressions.symbol(c): 0 for c in coefficients})
+        if without.expand() != 0:
+            left = expressions.plain(without)
+            zero = " and ".join(f"{c} = 0" for c in coefficients)
+            raise self.refuse("term", f"with {zero} it leaves {left}", "multiply each part by a coefficient")
 
     def roles(self) -> dict[str, str]:
         """Letter -> role; none where the effect says its equation."""
@@ -200,7 +210,7 @@ class _Table:
         for name in sorted(_words(text) - set(known) - expressions.RESERVED):
             places = "coefficients, inner or states"
             mend = (
-                f"add it to roles, {places}; the model's own names need equation"
+                f"add it to roles, {places}, or use the model's own names with equation in place of roles"
                 if "roles" in self.table
                 else f"add it to {places}, or declare it in the model"
             )
