@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from suite.effect import Added, Effect, Inner
 from suite.errors import InputError, ModelError
 from suite.model import Initial, Input, Model, Output, Parameter
 from suite.model_file import from_toml, read_model, to_toml, write_model
@@ -36,6 +37,23 @@ p = 0.0
 v = { value = 0.1, estimate = true }
 [suspect]
 equations = ["v"]
+[units]
+t = "s"
+p = "m"
+[[effects]]
+id = "magnet"
+term = "-a*exp(-p/w)"
+roles = { p = "position", v = "rate" }
+sentence = "A magnet pulls near the wall."
+sign = 1
+inner = { w = { of = "spread", start = 0.1, low = 0.01, high = 1.0 } }
+[[effects]]
+id = "lagging_drag"
+term = "b*c*z"
+equation = "v"
+coefficients = ["b"]
+inner = { w = { of = "time", start = 0.1, low = 0.01, high = 1, tries = [1, 10] } }
+states = { z = { rate = "(v - z)/w", start = "v", free = true } }
 """
 
 
@@ -58,6 +76,29 @@ def test_the_documented_file_means_what_is_documented() -> None:
     }
     assert model.initial == {"p": Initial(0.0), "v": Initial(0.1, estimate=True)}
     assert model.suspects == ("v",)
+    assert model.units == {"t": "s", "p": "m"}
+    assert model.effects == (
+        Effect(
+            id="magnet",
+            term="-a*exp(-p/w)",
+            roles={"p": "position", "v": "rate"},
+            sentence="A magnet pulls near the wall.",
+            dimension="",
+            sign=1,
+            inner={"w": Inner("spread", 0.1, 0.01, 1.0)},
+        ),
+        Effect(
+            id="lagging_drag",
+            term="+b*c*z",
+            roles={},
+            sentence="",
+            dimension="",
+            coefficients=("b",),
+            inner={"w": Inner("time", 0.1, 0.01, 1.0, (1.0, 10.0))},
+            states={"z": Added("(v - z)/w", "v", free=True)},
+            equation="v",
+        ),
+    )
 
 
 def test_a_file_written_is_the_model_read(tmp_path: Path) -> None:
@@ -73,13 +114,56 @@ def test_a_file_written_is_the_model_read(tmp_path: Path) -> None:
 TEXT = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=20).filter(lambda text: text.strip())
 NUMBER = st.floats(allow_nan=False, allow_infinity=False)
 POSITIVE = st.floats(5e-324, 1e300)
-PARAMETER = st.builds(Parameter, value=NUMBER, sd=st.none() | POSITIVE, fixed=st.booleans(), unit=st.none() | TEXT)
+UNIT = st.sampled_from(["1", "m", "kg m^2", "N*s/m", "1/m^2/s^2", "degC", "%", "m^0.5/s", "µm"])
+PARAMETER = st.builds(Parameter, value=NUMBER, sd=st.none() | POSITIVE, fixed=st.booleans(), unit=st.none() | UNIT)
 INPUT = st.builds(Input, column=TEXT, hold=st.sampled_from(["previous", "linear"]))
 OUTPUT = st.builds(Output, equation=st.just("x*a + u"), column=TEXT, sigma=st.none() | POSITIVE, angle=st.booleans())
+SCALE = st.builds(
+    Inner,
+    of=st.sampled_from(["spread", "range", "frequency", "time", "step", "one"]),
+    start=st.floats(1.0, 2.0),
+    low=st.floats(0.1, 1.0),
+    high=st.floats(3.0, 1e300),
+    tries=st.just((1.0, 0.3, 3.0)) | st.lists(POSITIVE, min_size=1, max_size=3).map(tuple),
+)
+ADDED = st.builds(
+    Added, rate=st.sampled_from(["(x - z)/w", "x*t"]), start=st.just("0") | st.just("x"), free=st.booleans()
+)
+WORDS = st.just("") | TEXT
+EFFECT = st.builds(
+    Effect,
+    id=st.from_regex(r"[a-z]{1,9}_of_mine", fullmatch=True),
+    term=st.just("-b*(x*exp(-t/w) + z)"),
+    roles=st.just({}),
+    equation=st.sampled_from(["x", "u", "out put"]),
+    sentence=WORDS,
+    dimension=WORDS,
+    coefficients=st.just(("b",)),
+    sign=st.sampled_from([0, 1]),
+    inner=st.builds(lambda scale: {"w": scale}, SCALE),
+    states=st.builds(lambda state: {"z": state}, ADDED),
+    forms=st.just(()) | st.just(("+b*x/w", "-b*z")),
+    pinned=st.booleans(),
+    family=WORDS,
+    generic=st.booleans(),
+) | st.builds(
+    Effect,
+    id=st.from_regex(r"[a-z]{1,9}_of_yours", fullmatch=True),
+    term=st.just("-a*y"),
+    roles=st.sampled_from(
+        [{"y": "any"}, {"y": "output"}, {"y": "level", "q": "temperature"}, {"y": "held", "q": "input"}]
+    ),
+    sentence=WORDS,
+    dimension=WORDS,
+)
+EFFECTS = st.lists(EFFECT, max_size=3, unique_by=lambda effect: effect.id).map(tuple)
+UNITS = st.dictionaries(st.sampled_from(["u", "t"]), UNIT)
 
 
-@settings(max_examples=60, deadline=None)
-@given(TEXT, PARAMETER, INPUT, OUTPUT, st.none() | TEXT, st.none() | st.just(()) | st.just(("x",)), NUMBER)
+@settings(max_examples=80, deadline=None)
+@given(
+    TEXT, PARAMETER, INPUT, OUTPUT, st.none() | TEXT, st.none() | st.just(()) | st.just(("x",)), NUMBER, UNITS, EFFECTS
+)
 def test_every_model_round_trips(
     name: str,
     parameter: Parameter,
@@ -88,8 +172,10 @@ def test_every_model_round_trips(
     time: str | None,
     suspect: tuple[str, ...] | None,
     start: float,
+    units: dict[str, str],
+    effects: tuple[Effect, ...],
 ) -> None:
-    """Any names, units and columns, any finite number to its last digit."""
+    """Any names, units, columns and effects, any finite number to its last digit."""
     model = Model(
         name=name,
         states={"x": "-a*x + u"},
@@ -99,6 +185,8 @@ def test_every_model_round_trips(
         initial={"x": Initial(start)},
         suspect=suspect,
         time=time,
+        units=units,
+        effects=effects,
     )
     assert from_toml(to_toml(model)) == model
 
@@ -145,6 +233,17 @@ DEFECTS = {
     "syntax": ("[states]\nx = -k*x", "line 2"),
     "twice": ("[states]\nx = '0'\nx = '1'", "not valid TOML: cannot overwrite a value"),
     "deep": ("x = " + "[" * 50_000, "not valid TOML"),
+    "a unit of nothing": (
+        STATES + "[parameters]\nk=1\n[units]\nq = 'm'",
+        "[units] q: neither a state nor an input nor t",
+    ),
+    "a unit as number": (STATES + "[parameters]\nk=1\n[units]\nx = 1", "[units] x: expected text in quotes, got 1"),
+    "a unit that is none": (STATES + "[parameters]\nk=1\n[units]\nx = 'Volt'", "[units] x: 'Volt' is no unit"),
+    "a parameter's unit that is none": (STATES + "[parameters]\nk={value=1, unit='n/a'}", "k unit: 'n/a' is no unit"),
+    "unlike units": (
+        STATES + "[parameters]\nk={value=1, unit='1/min'}\n[units]\nx='m'\nt='s'",
+        "[states] x: the term k*x is in m/min, but x' is in m/s; multiply by 0.0166667, or correct a unit",
+    ),
 }
 
 
