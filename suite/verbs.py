@@ -232,7 +232,7 @@ def discover(args: argparse.Namespace) -> int:
     from suite.report.page import write_figures, write_report
 
     model, record = _read(args)
-    effects = plugins.effects()
+    effects = plugins.effects() | {effect.id: effect for effect in model.effects}
     # A folder that cannot be written is refused before minutes are spent.
     folder: Path = args.output
     writable_folder(folder)

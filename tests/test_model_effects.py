@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from suite.discovery.library import candidates
 from suite.discovery.verdict import diagnose
 from suite.errors import ModelError
 from suite.model import Parameter
+from suite.model_effects import KEYS
 from suite.model_file import from_toml, read_model
 from suite.record import Record
 
@@ -177,3 +179,11 @@ def test_an_effect_of_the_models_own_can_be_added(tmp_path: Path, capsys: pytest
     assert new.effects == from_toml(MAGNET).effects
     assert main(["add", str(tmp_path / "plant.toml"), "magnets", "-o", str(tmp_path / "other.toml")]) == 2
     assert "did you mean magnet?" in capsys.readouterr().err
+
+
+def test_the_documented_tables_are_read() -> None:
+    """The blocks of docs/model-file.md, one after the other, are a model file; no key is left undocumented."""
+    text = (Path(__file__).parents[1] / "docs" / "model-file.md").read_text(encoding="utf-8")
+    model = from_toml("".join(re.findall(r"```toml\n(.*?)```", text, re.DOTALL)), "plant.toml")
+    assert [effect.id for effect in model.effects] == ["magnet", "creep"]
+    assert all(f"| `{key}` |" in text for key in KEYS)
