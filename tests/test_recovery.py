@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from suite import plugins
+from suite.__main__ import main
 from suite.benchmark import conditions, hashes, plan, recovery, recovery_summary, sparse
 from suite.benchmark.cells import Cell
 from suite.benchmark.statistics import wilson
@@ -246,45 +247,35 @@ def test_plans_of_recovery_choose_conditions_that_a_case_has() -> None:
         plan.parse({"kind": "guess"}, "p", "p.toml")
 
 
-def test_a_killed_recovery_run_resumes_and_is_shown(tmp_path: Path) -> None:
+def test_a_killed_recovery_run_resumes_and_is_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Killed with -9 in the middle and started again, only what was not stored runs; then tables and figures come."""
-    path, store = tmp_path / "p.toml", tmp_path / "r.sqlite"
+    path, store, out = tmp_path / "p.toml", tmp_path / "r.sqlite", tmp_path / "out"
     path.write_text(
         'kind = "recovery"\ncases = ["paper-cubic"]\nestimators = ["unmodelled", "smoothed-regression"]\n'
-        'variants = ["missing", "null-right"]\nnoises = [0.05]\nseeds = 4\n'
+        'variants = ["missing", "null-right"]\nnoises = [0.05]\nseeds = 2\n'
     )
-    opening = [sys.executable, "-m", "suite", "bench"]
-    words = [*opening, "run", "--plan", str(path), "--store", str(store), "--jobs", "1", "--json"]
-    process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    words = ["bench", "run", "--plan", str(path), "--store", str(store), "--jobs", "1", "--json"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "suite", *words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
     give_up = time.monotonic() + 200
-    while time.monotonic() < give_up and not (store.exists() and len(_rows(store)) >= 3):
-        time.sleep(0.1)
+    while time.monotonic() < give_up and process.poll() is None and not (store.exists() and _rows(store)):
+        time.sleep(0.05)
     process.send_signal(signal.SIGKILL)
     process.communicate()
     kept = len(_rows(store))
-    assert 3 <= kept < 16
-    done = json.loads(subprocess.run(words, capture_output=True, text=True, check=True).stdout)
-    assert (done["unchanged"], done["run"]) == (kept, 16 - kept)
-    shown = subprocess.run(
-        [*opening, "recovery", "--store", str(store), "-o", str(tmp_path / "out"), "--json"],
-        capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    names = {Path(name).name for name in json.loads(shown.stdout)["files"]}
-    assert {
-        "must-reach.csv",
-        "must-reach.parquet",
-        "rows.json",
-        "reliability.svg",
-        "methods.svg",
-        "recovery.md",
-    } <= names
-    drawn = (tmp_path / "out" / "methods.svg").read_text()
+    assert 1 <= kept < 8
+    assert main(words) == 0
+    done = json.loads(capsys.readouterr().out)
+    assert (done["unchanged"], done["run"]) == (kept, 8 - kept)
+    assert main(["bench", "recovery", "--store", str(store), "-o", str(out), "--json"]) == 0
+    names = {Path(name).name for name in json.loads(capsys.readouterr().out)["files"]}
+    assert {"must-reach.csv", "must-reach.parquet", "rows.json", "reliability.svg", "methods.svg"} <= names
+    drawn = (out / "methods.svg").read_text()
     assert "<title>" in drawn
     assert "<desc>" in drawn
-    table = subprocess.run(
-        [*opening, "table", "--plan", str(path), "--store", str(store)], capture_output=True, text=True, check=True
-    )
-    assert "true effect first at 1 % noise, all" in table.stdout
+    assert main(["bench", "table", "--plan", str(path), "--store", str(store)]) == 0
+    assert "true effect first at 1 % noise, all" in capsys.readouterr().out
 
 
 def _rows(path: Path) -> list[dict[str, Any]]:

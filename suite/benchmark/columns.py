@@ -10,14 +10,18 @@ import sympy
 
 from suite import expressions
 from suite.case import Missing
-from suite.discovery.library import Term, candidates
+from suite.discovery.library import candidates
+from suite.discovery.terms import Term
 from suite.effect import Effect, Inner
 from suite.model import Model
 from suite.record import Record
 
 Array = npt.NDArray[np.float64]
+Name = tuple[str, str]
 
+COLLINEAR = 1e-3  # share of a column that the parameters' columns leave, below which it is a parameter
 SAME = 1e-6  # 1 - cos^2 of two columns below which they are one function on this path
+TWICE = 1e-10  # ... below which one column stands there twice
 
 
 def in_rates(model: Model, effects: Mapping[str, Effect]) -> list[Term]:
@@ -48,6 +52,43 @@ def column(model: Model, term: Term, record: Record, x: Array) -> Array | None:
     return filled if np.isfinite(filled).all() else None
 
 
+def named(model: Model, effects: Mapping[str, Effect], record: Record, x: Array) -> dict[Name, Array]:
+    """The candidates' columns by (effect, equation); where one effect binds twice in an equation, the first.
+
+    A term whose column is another's, as that of a power at its start, is left out: a regression cannot hold both.
+    """
+    found: dict[Name, Array] = {}
+    for term in sorted(in_rates(model, effects), key=lambda term: len(term.inner)):
+        values = column(model, term, record, x)
+        if values is None or not values.any():
+            continue
+        beside = [other for name, other in found.items() if name[1] == term.equation]
+        if not any(_proportional(values, other, TWICE) for other in beside):
+            found.setdefault((term.effect.id, term.equation), values)
+    return found
+
+
+def disguised(model: Model, record: Record, x: Array, found: Mapping[Name, Array]) -> set[Name]:
+    """The candidates that are a free parameter of the model in disguise: the derivatives of their equation's rate by
+    the parameters (central differences) explain their column.
+    """
+    slopes = []
+    for j, parameter in enumerate(model.parameters.values()):
+        step = 1e-5 * (abs(parameter.value) or 1.0) if parameter.prior_sd > 0 else 0.0
+        moved = [model.values + sign * step * np.eye(len(model.values))[j] for sign in (1.0, -1.0)]
+        points = zip(record.t, x, record.u, strict=True) if step else ()
+        slopes += [[np.subtract(*(model.rate(t, state, u, p) for p in moved)) / (2 * step) for t, state, u in points]]
+    by_parameter = np.array([slope for slope in slopes if slope])
+    hidden = set()
+    for name, values in found.items() if len(by_parameter) else ():
+        A = by_parameter[:, :, list(model.states).index(name[1])].T
+        A = A / np.maximum(np.sqrt((A**2).sum(axis=0)), 1e-300)
+        left = values - A @ np.linalg.lstsq(A, values, rcond=None)[0]
+        if np.linalg.norm(left) < COLLINEAR * np.linalg.norm(values):
+            hidden.add(name)
+    return hidden
+
+
 def _start(inner: Inner, place: Array, record: Record) -> float:
     """An inner scale at its start, in the units of this path; `place` (N,) is the variable of the term."""
     low, spread = float(place.min()), float(np.ptp(place)) or 1.0
@@ -75,5 +116,10 @@ def _one_function(model: Model, a: Term, b: Term, record: Record, x: Array) -> b
     u, v = column(model, a, record, x), column(model, b, record, x)
     if u is None or v is None or len(a.inner) != len(b.inner):
         return False
+    return _proportional(u, v, SAME)
+
+
+def _proportional(u: Array, v: Array, share: float) -> bool:
+    """Whether all but a share of the squares of u and v is common."""
     lengths = float(u @ u) * float(v @ v)
-    return lengths > 0 and 1.0 - float(u @ v) ** 2 / lengths < SAME
+    return lengths > 0 and 1.0 - float(u @ v) ** 2 / lengths < share

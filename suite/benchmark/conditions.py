@@ -72,8 +72,9 @@ def trial(case: Case, condition: str, noise: float, seed: int, effects: Mapping[
         case = _complete(case)
     (record, truth), (still, _) = case.simulate(noise, seed), case.simulate(0.0, seed)
     clean, sigma = still.y, truth.noise
-    if not (np.isfinite(clean).all() and (sigma > 0).all()):
-        said = "runs away" if not np.isfinite(clean).all() else "has no noise or stands still"
+    finite = np.isfinite(truth.x).all() and np.isfinite(sigma).all()
+    if not (finite and (sigma > 0).all()):
+        said = "has no noise or stands still" if finite else "runs away"
         raise DataError(f"{case.name}: the plant of {condition!r} {said}, so there is nothing to judge")
     rng = np.random.default_rng([seed, 1])
     model = case.deficient if condition == "null-right" else _drawn(case.deficient, rng, condition == "null-wrong")
@@ -89,8 +90,10 @@ def trial(case: Case, condition: str, noise: float, seed: int, effects: Mapping[
 
 def _complete(case: Case) -> Case:
     """The case with its deficient model as the plant: nothing is missing."""
+    assert case.truth is not None
     assert case.experiment is not None
-    experiment = replace(case.experiment, x0=tuple(case.experiment.x0[: len(case.deficient.states)]))
+    first = dict(zip(case.truth.states, case.experiment.x0, strict=True))
+    experiment = replace(case.experiment, x0=tuple(first[name] for name in case.deficient.states))
     return replace(case, truth=case.deficient, experiment=experiment, missing=())
 
 

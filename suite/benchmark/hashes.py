@@ -58,7 +58,7 @@ def plugin(estimator: Estimator) -> str:
 # What a row of the recovery benchmark depends on, as files and folders of the packages.
 FINDING = ("suite/discovery", "suite/kernels", "suite/filtering.py", "suite/smoothing.py", "effects")
 JUDGING = ("recovery.py", "verdicts.py", "conditions.py", "columns.py")
-RIVAL = ("rivals.py", "sparse.py")
+RIVAL = ("rivals.py", "sparse.py", "better.py")
 
 
 def method(name: str) -> str:
@@ -70,8 +70,8 @@ def method(name: str) -> str:
     paths += [here / file for file in (*JUDGING, *(() if name == OURS else RIVAL))]
     texts = sorted((path.name, path.read_text(encoding="utf-8")) for path in paths)
     versions = [version("pysindy")] if "pysindy" in name and find_spec("pysindy") else []
-    filters = [plugin(plugins.estimators()["generalized-ie"])] if name == "correlation" else []
-    return _digest(name, texts, sorted(plugins.effects()), versions, filters)
+    filters = [plugin(plugins.estimators()[used]) for used in ("generalized-ie", "random-walk-smoother")]
+    return _digest(name, texts, sorted(plugins.effects()), versions, filters if name != OURS else [])
 
 
 def case(entry: Case, data: Path | None) -> str:

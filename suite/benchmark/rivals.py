@@ -14,6 +14,7 @@ from scipy import stats
 from suite import plugins
 from suite.benchmark import columns
 from suite.benchmark.better import walk_density
+from suite.benchmark.columns import Name
 from suite.benchmark.conditions import Trial
 from suite.discovery.fit import fit
 from suite.discovery.noise import noise_variance
@@ -22,7 +23,7 @@ from suite.prior import default_prior
 from suite.record import Record
 
 Array = npt.NDArray[np.float64]
-Name = columns.Name
+
 
 SIGNIFICANT = 0.01  # of all correlations together: below it the test names its best
 MOST = 3  # terms that a regression may take

@@ -15,9 +15,7 @@ import numpy.typing as npt
 
 from suite.benchmark import columns
 from suite.benchmark.conditions import Trial
-from suite.benchmark.rivals import Answer, Name, independent
-from suite.discovery.fit import fit
-from suite.discovery.library import Term
+from suite.benchmark.rivals import Answer, Name, calibrated, independent
 from suite.model import Model
 from suite.record import Record
 
@@ -58,14 +56,13 @@ def weak(trial: Trial) -> Answer:
     """The weak form: rate and candidates are integrated against test functions (Messenger and Bortz 2021)."""
     import pysindy
 
-    model, x = _calibrated(trial)
-    terms = columns.in_rates(model, trial.effects)
-    record = trial.record
+    model, record, x = _states(trial)
+    library_columns = columns.named(model, trial.effects, record, x)
     # Every feature is a function of the states, its values looked up beside them: the record is one fixed path.
     rates = np.array([model.rate(t, state, u) for t, state, u in zip(record.t, x, record.u, strict=True)])
     found: list[tuple[float, Name]] = []
     for i, equation in enumerate(model.states):
-        group = _group(model, terms, equation, record, x)
+        group = {name: column for name, column in library_columns.items() if name[1] == equation}
         if equation not in model.suspects or not group:
             continue
         data = np.column_stack([x[:, i], rates[:, i], *group.values()])
@@ -83,40 +80,31 @@ def weak(trial: Trial) -> Answer:
         finally:
             np.random.set_state(state)
         found += _sizes(group, integrated[:, 2:], slopes - integrated[:, 1], _thresholded, APART)
-    return _answer(found, len(terms))
+    return _answer(found, columns.disguised(model, record, x, library_columns))
 
 
 def _pointwise(trial: Trial, solve: Solver) -> Answer:
     import pysindy
 
-    model, x = _calibrated(trial)
-    record = trial.record
-    terms = columns.in_rates(model, trial.effects)
+    model, record, x = _states(trial)
+    library_columns = columns.named(model, trial.effects, record, x)
     slopes = np.asarray(pysindy.SmoothedFiniteDifference()(x, record.t))
     rates = np.array([model.rate(t, state, u) for t, state, u in zip(record.t, x, record.u, strict=True)])
     found: list[tuple[float, Name]] = []
     for i, equation in enumerate(model.states):
-        group = _group(model, terms, equation, record, x)
+        group = {name: column for name, column in library_columns.items() if name[1] == equation}
         if equation in model.suspects and group:
             A, d = np.column_stack(list(group.values())), slopes[:, i] - rates[:, i]
             found += _sizes(group, A, d, solve, independent(d, A))
-    return _answer(found, len(terms))
+    return _answer(found, columns.disguised(model, record, x, library_columns))
 
 
-def _calibrated(trial: Trial) -> tuple[Model, Array]:
-    """The deficient model refitted, and its states as they were measured, (N, n)."""
-    names = [output.equation.strip() for output in trial.model.outputs.values()]
-    x = trial.record.y[:, [names.index(state) for state in trial.model.states]]
-    return fit(trial.model, trial.record).model, np.ascontiguousarray(x)
-
-
-def _group(model: Model, terms: list[Term], equation: str, record: Record, x: Array) -> dict[Name, Array]:
-    found: dict[Name, Array] = {}
-    for term in terms:
-        values = columns.column(model, term, record, x) if term.equation == equation else None
-        if values is not None and values.any():
-            found.setdefault((term.effect.id, equation), values)
-    return found
+def _states(trial: Trial) -> tuple[Model, Record, Array]:
+    """The deficient model refitted, the record, and the states as they were measured, (N, n)."""
+    model, record = calibrated(trial)
+    names = [output.equation.strip() for output in model.outputs.values()]
+    x = record.y[:, [names.index(state) for state in model.states]]
+    return model, record, np.ascontiguousarray(x)
 
 
 def _sizes(group: dict[Name, Array], A: Array, d: Array, solve: Solver, count: float) -> list[tuple[float, Name]]:
@@ -129,9 +117,11 @@ def _sizes(group: dict[Name, Array], A: Array, d: Array, solve: Solver, count: f
     return [(abs(float(value)), name) for value, name in zip(c, group, strict=True)]
 
 
-def _answer(found: list[tuple[float, Name]], count: int) -> Answer:
-    ranked = sorted(found, key=lambda pair: -pair[0])
-    return Answer(tuple(name for size, name in ranked if size > 0), tuple(name for _, name in ranked), count)
+def _answer(found: list[tuple[float, Name]], disguised: set[Name]) -> Answer:
+    """What was taken, largest share first; a parameter in disguise corrects the calibration and is no effect."""
+    ranked = sorted((pair for pair in found if pair[1] not in disguised), key=lambda pair: -pair[0])
+    named = tuple(name for size, name in ranked if size > 0)
+    return Answer(named, tuple(name for _, name in ranked), len(found))
 
 
 def _thresholded(A: Array, d: Array, count: float) -> Array:

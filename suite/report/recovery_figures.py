@@ -94,10 +94,12 @@ def _coefficients(rows: Sequence[Row]) -> Figure | None:
     title = f"Coefficients err by {rms:.2f} of their stated deviation; {100 * cover:.0f} % of the 95 % intervals cover"
     figure = new_figure(title, "Histogram of coefficient errors over stated standard deviations.", 4.2)
     ax = dressed(figure.subplots(), "(coefficient - true value) / stated standard deviation", "density")
-    edges = np.linspace(-4.5, 4.5, int(np.clip(np.sqrt(len(z)) * 1.5, 10, 45)) + 1)
-    ax.hist(np.clip(z, -4.49, 4.49), bins=edges.tolist(), density=True, color=SKY, label=f"{len(z)} coefficients")
+    edges = np.linspace(-4.5, 4.5, 37 if len(z) > 300 else 19)
+    ax.hist(
+        np.clip(z, -4.49, 4.49), bins=edges.tolist(), density=True, color=SKY, label=f"{len(z)} coefficients", zorder=2
+    )
     grid = np.linspace(-4.5, 4.5, 200)
-    ax.plot(grid, norm.pdf(grid), color=INK, lw=1.6, label="normal distribution, as stated")
+    ax.plot(grid, norm.pdf(grid), color=INK, lw=1.6, zorder=3, label="normal distribution, as stated")
     for side in (-1.96, 1.96):
         ax.axvline(side, color=VERMILION, lw=1.2, ls="--", label="95 % interval")
     beyond = int((np.abs(z) > 4.5).sum())
@@ -148,11 +150,15 @@ def _methods(rows: Sequence[Row]) -> Figure | None:
     title = "How often each method names what is missing"
     if lowest:
         best = max(lowest, key=lambda line: line["exact"])
-        ours = "" if best["ours_exact"] is None else f", {OURS} in {100 * best['ours_exact']:.0f} % of them"
+        ours = (
+            "" if best["ours_exact"] is None else f", {OURS} in {100 * best['ours_exact']:.0f} % of {best['records']}"
+        )
         title = (
             f"At {100 * noises[0]:g} % noise {best['method']} finds exactly what is missing in "
-            f"{100 * best['exact']:.0f} % of {best['records']} records{ours}"
+            f"{100 * best['exact']:.0f} % of the records{ours}"
         )
+    if lowest and not best["exact"]:
+        title = f"At {100 * noises[0]:g} % noise no rival finds exactly what is missing{ours}"
     figure = new_figure(title, "Bars by method and noise: effect first, exact structure.", 1.5 + 0.85 * len(methods))
     axes = figure.subplots(1, 2, sharey=True)
     height = 0.8 / len(noises)
