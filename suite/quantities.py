@@ -63,11 +63,14 @@ def unit(text: str) -> Unit | None:
     registry = _registry()
     try:
         found = registry.parse_units(plain)
-        registry.get_root_units(found)
         for name, exponent in list(found._units.items()):
             if name in DEGREES:
                 found = found / registry.Unit(registry.UnitsContainer({name: exponent}))
                 found = found * registry.Unit(DEGREES[name]) ** exponent
+        registry.get_root_units(found)
+        # A logarithmic scale (dB) has no rate; pint refuses to divide it only where it stands within others.
+        if not all(registry._is_multiplicative(name) for name in found._units):
+            return None
     except Exception:  # pint has many ways to say that this is no unit
         return None
     return found
@@ -83,7 +86,10 @@ def factor(got: Unit, wanted: Unit) -> float | None:
     ratio = got / wanted
     if any(abs(exponent) > 1e-9 for exponent in ratio.dimensionality.values()):
         return None
-    return float(_registry().get_root_units(ratio)[0])
+    try:
+        return float(_registry().get_root_units(ratio)[0])
+    except OverflowError:  # a power too high for floating point: the equation's own trouble, not its units'
+        return 1.0
 
 
 def turns(of: Unit) -> bool:

@@ -143,8 +143,8 @@ def _arguments(expression: Any) -> Iterator[Any]:
         measures = isinstance(node, sympy.Abs | sympy.sign | sympy.atan2 | sympy.Min | sympy.Max)
         if node.is_Function and not measures:
             yield node.args[0]
-        elif node.is_Pow and not node.exp.is_number:
-            yield node.exp
+        elif node.is_Pow and not node.args[1].is_number:
+            yield node.args[1]
 
 
 def _reach(term: Term, name: str, units: Mapping[str, Unit], model: Model) -> Unit | None:

@@ -120,6 +120,7 @@ REFUSED = {
     ),
     "a tower": (replace(OSCILLATOR, units={"p": "m^9^9^9^9"}), "'m^9^9^9^9' is no unit that is known"),
     "a number in it": (replace(OSCILLATOR, units={"p": "10 m"}), "'10 m' is no unit that is known"),
+    "a logarithmic scale": (replace(OSCILLATOR, units={"p": "dB"}), "[units] p: 'dB' is no unit that is known"),
     "nobody's unit": (replace(OSCILLATOR, units={"p": "__import__('os')"}), "is no unit that is known"),
 }
 
