@@ -14,8 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from suite.benchmark import columns
+from suite.benchmark.columns import Name
 from suite.benchmark.conditions import Trial
-from suite.benchmark.rivals import Answer, Name, calibrated, independent
+from suite.benchmark.rivals import Answer, calibrated, independent
 from suite.model import Model
 from suite.record import Record
 
