@@ -139,7 +139,8 @@ def _in_argument(expression: Any, name: str, units: Mapping[str, Unit]) -> Unit 
 
 def _arguments(expression: Any) -> Iterator[Any]:
     """Everything in the expression that a function takes as a pure number."""
-    for node in sympy.preorder_traversal(expression):
+    nodes: Iterator[Any] = sympy.preorder_traversal(expression)
+    for node in nodes:
         measures = isinstance(node, sympy.Abs | sympy.sign | sympy.atan2 | sympy.Min | sympy.Max)
         if node.is_Function and not measures:
             yield node.args[0]
