@@ -139,13 +139,13 @@ def _in_argument(expression: Any, name: str, units: Mapping[str, Unit]) -> Unit 
 
 def _arguments(expression: Any) -> Iterator[Any]:
     """Everything in the expression that a function takes as a pure number."""
-    nodes: Iterator[Any] = sympy.preorder_traversal(expression)
-    for node in nodes:
+    for node in sympy.preorder_traversal(expression):
         measures = isinstance(node, sympy.Abs | sympy.sign | sympy.atan2 | sympy.Min | sympy.Max)
         if node.is_Function and not measures:
             yield node.args[0]
-        elif node.is_Pow and not node.args[1].is_number:
-            yield node.args[1]
+        elif node.is_Pow:
+            *_, exponent = node.args
+            yield exponent
 
 
 def _reach(term: Term, name: str, units: Mapping[str, Unit], model: Model) -> Unit | None:
