@@ -10,6 +10,6 @@ EFFECT = Effect(
     dimension="1/time",
     sign=1,
     inner={"w": Inner("time", 0.2, 0.002, 5.0, (1.0, 0.3, 0.1, 3.0))},
-    states={"z": Added("(D - z)/w")},
+    states={"z": Added("(D - z)/w", free=True)},
     family="a second store fills and empties",
 )

@@ -44,6 +44,9 @@ def add_parser(subparsers: Any) -> None:
         "recovery", parents=[store, out, as_json], help="how surely the missing effect is named"
     )
     recovery.add_argument("--plan", metavar="NAME|FILE", help="the cells of one plan, default every stored one")
+    measured = verbs.add_parser("measured", parents=[out, as_json], help="measured cases judged on held-out parts")
+    measured.add_argument("--only", metavar="PATTERN", help="cases with this in their name")
+    measured.add_argument("--data", type=Path, metavar="DIR", help="folder of measured data that are not shipped")
     claims = verbs.add_parser("claims", parents=[as_json], help="published numbers beside ours")
     claims.add_argument("--brief", action="store_true", help="the ledger alone, without what the source leaves open")
     one = verbs.add_parser("table1", parents=[out, as_json], help="the sources' Table 1 and what better methods reach")
@@ -61,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     """Run a verb; 0 done, 2 by InputError."""
     verb = {
         "list": _list, "run": _run, "tune": _run, "table": _table, "plot": _plot, "recovery": _recovery,
-        "claims": _claims, "table1": _table_one,
+        "claims": _claims, "measured": _measured, "table1": _table_one,
     }  # fmt: skip
     return verb[args.bench](args)
 
@@ -187,6 +190,12 @@ def _claims(args: argparse.Namespace) -> int:
 
         print("\n" + table_one.open_text())
     return 0
+
+
+def _measured(args: argparse.Namespace) -> int:
+    from suite.benchmark import held_out
+
+    return held_out.verb(args)
 
 
 def _table_one(args: argparse.Namespace) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -88,20 +89,21 @@ def test_jacobian_of_the_engine_is_the_difference_quotient(paper: Case, record: 
     """Sensitivities of the prediction error by initial state, parameters and candidates, all gates on."""
     model = replace(known(paper.deficient), initial={})
     problem = prepare(model, record, candidates(model, EFFECTS))
-    active = list(range(len(problem.terms)))
+    # A clipping sensor and a sample that is held have corners, where a difference quotient means nothing.
+    smooth = [k for k, term in enumerate(problem.terms) if "min(" not in term.text and "max(" not in term.text]
     p = problem.start.p.copy()
     p[len(model.parameters) :] += 0.01
     point = Point(problem.start.x0, p)
-    columns = problem.columns(active)
-    J = problem.run(point, 0.0, active, columns).J
-    theta = problem.pack(point, columns)
+    layout = problem.layout(smooth)
+    J = problem.run(point, 0.0, layout).J
+    theta = problem.pack(point, layout)
     for j in range(len(theta)):
         step = 1e-6 * max(1.0, abs(theta[j]))
         ends = []
         for sign in (1.0, -1.0):
             moved = theta.copy()
             moved[j] += sign * step
-            ends.append(problem.run(problem.unpack(moved, point, columns), 0.0, active, columns).e)
+            ends.append(problem.run(problem.unpack(moved, point, layout), 0.0, layout).e)
         quotient = (ends[0] - ends[1]) / (2 * step)
         assert np.abs(J[:, j] - quotient).max() <= 1e-4 * max(np.abs(quotient).max(), 1e-3)
 
@@ -144,10 +146,15 @@ def test_an_unmeasured_state_hides_no_drag() -> None:
 def test_candidates_keep_the_symmetry_of_free_fall() -> None:
     """Where no equation depends on the height, no candidate does; unless asked."""
     model = Model("fall", {"z": "v", "v": "-g"}, {"g": Parameter(9.81, fixed=True)}, outputs={"z": Output("z", "z")})
-    texts = [term.text for term in candidates(model, EFFECTS)]
-    assert texts
-    assert not any("z" in text for text in texts)
-    assert any("z" in term.text for term in candidates(model, EFFECTS, absolute=True))
+
+
+    def texts(absolute: bool) -> list[str]:
+        terms = [term for term in candidates(model, EFFECTS, absolute) if term.place == "rate"]
+        return [text for term in terms for text in (term.text, *(z[0] for z in term.states.values()))]
+
+    assert texts(absolute=False)
+    assert not any(re.search(r"\bz\b", text) for text in texts(absolute=False))
+    assert any(re.search(r"\bz\b", text) for text in texts(absolute=True))
 
 
 def test_a_parameter_in_disguise_is_no_candidate(paper: Case, record: Record) -> None:
@@ -200,7 +207,7 @@ def test_the_cooling_mug_loses_more_than_in_proportion() -> None:
     assert verdict.verdict in ("ambiguous", "missing_effect")
     assert verdict.error["before"]["T"] == pytest.approx(1.48, abs=0.01)
     assert verdict.error["after"]["T"] < 0.15
-    assert len(verdict.effects) == 1
+    assert any(named.family for named in (EFFECTS[e.effect] for e in verdict.effects))
     assert "grows faster than proportionally" in verdict.sentence
     assert verdict.advice
 

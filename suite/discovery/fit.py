@@ -162,6 +162,8 @@ def covariance(problem: Problem, level: Level, columns: Index) -> Array:
     sd = problem.prior[1][columns]
     pulls = np.where(np.isfinite(sd), 1.0 / np.where(np.isfinite(sd), sd, 1.0) ** 2, 0.0)
     A = level.passed.J.T @ level.passed.J / noise
+    if not np.isfinite(A).all():
+        return np.full(A.shape, 1e300)
     edge = A.shape[0] - len(columns)
     A[edge:, edge:] += np.diag(pulls)
     scale = np.sqrt(np.maximum(np.diag(A), 1e-300))

@@ -23,6 +23,7 @@ BEAM = 3  # hypotheses that a second effect is added to
 NEXT = 5  # second effects refitted for each of them
 CLOSE = 25.0  # rivals within this of the best are converged before weights are formed
 ALARM = 9.0  # Lambda above which the model fails
+WORTH = 0.7  # of the error's variance: what a further effect must leave less than, for yet another to be sought
 PAIRS = 5  # pairs that are refitted because they help together
 
 
@@ -37,12 +38,15 @@ class Search:
     frequencies: int = 1
     scores: tuple[Score, ...] = field(default=())
     seconds: float = 0.0
+    block: Search | None = None  # of a long record: the search on the part of it that was searched
 
     def criterion(self, hypothesis: Hypothesis, level: Level | None = None) -> float:
         """EBIC = L + k ln N + 2 (number of terms) ln(library size), k counting inner scales."""
         L = (level or hypothesis.exact).L
         terms = [self.problem.terms[k] for k in hypothesis.active]
-        count = sum(len(term.counted) for term in terms)
+        # First values that a candidate leaves open are as free as its parameters, in every run.
+        open_values = sum(z[2] for term in terms for z in term.states.values()) * len(self.problem.record.starts)
+        count = sum(len(term.counted) for term in terms) + open_values
         library = len(self.problem.terms) - len(self.absorbed)
         extra = 2.0 * len(terms) * np.log(max(library, 2))
         tones = sum(2.0 * np.log(self.frequencies) for term in terms if is_tone(term))
@@ -111,6 +115,12 @@ def refit(problem: Problem, parent: Hypothesis, active: tuple[int, ...], starts:
     return min(tried, key=lambda hypothesis: hypothesis.exact.L)
 
 
+def _left(hypothesis: Hypothesis) -> float:
+    """The mean squared error of the exact simulation, in noise units; infinite where it runs away."""
+    passed = hypothesis.exact.passed
+    return float(np.mean(passed.e**2)) if passed.finite else np.inf
+
+
 def _converged(found: Search, fitted: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Rivals that are close, converged at q = 0: unconverged ones look further away than they are."""
     if not fitted:
@@ -158,5 +168,7 @@ def _grow(found: Search) -> Search:
         known = {frozenset(hypothesis.active): hypothesis for hypothesis in fitted}
         grown = min(known.values(), key=found.criterion)
         if found.criterion(grown) >= found.criterion(best) or not needs_more(found, grown):
+            break
+        if _left(grown) > WORTH * _left(best):
             break
     return replace(found, fitted=tuple(known.values()))

@@ -49,16 +49,9 @@ def discover(
         progress(verdict.sentence)
         if verdict.verdict not in ("missing_effect", "ambiguous") or number == ROUNDS or not named.active:
             break
-        if not _improves(found, named):
-            break
         current = amended(found.problem, named, fitted=False)
     assert first is not None
     return Ledger(record, tuple(steps), _conclusion(first, steps), tuple(history))
-
-
-def _improves(found: Search, named: Hypothesis) -> bool:
-    """Whether the named effects lower the error at all, held-out data included in the criterion's penalty."""
-    return found.criterion(named, named.best) < found.criterion(found.base, found.base.best)
 
 
 def _step(found: Search, verdict: Verdict) -> Step:

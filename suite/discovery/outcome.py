@@ -115,19 +115,45 @@ def errors(found: Search, named: Hypothesis) -> dict[str, Any]:
 def held_out(problem: Problem, hypothesis: Hypothesis, parts: Split) -> dict[str, float]:
     """Free-run error on what is held out, of the same structure fitted to the training part alone.
 
-    The fit starts from the file's parameters and from the coefficients found; a run of its own then has its unknown
-    first state fitted, with all parameters fixed.
+    The fit starts where the whole record's ended; a run of its own then has its unknown first state fitted, with all
+    parameters fixed.
     """
     runs = len(parts.train.starts)
-    p = problem.start.p.copy()
-    for k in hypothesis.active:
-        p[problem.places(k)] = hypothesis.exact.point.p[problem.places(k)]
+    p = hypothesis.exact.point.p
     x0 = hypothesis.exact.point.x0[:runs]
     train = problem.on(parts.train, Point(x0, problem.start.p))
-    point = homotopy(train, Point(x0, p), hypothesis.active, first=0.1).exact.point
+    point = homotopy(train, Point(x0, p), hypothesis.active, first=1e-3).exact.point
     judged = problem.on(parts.judged, problem.start, frozen=True)
     if parts.first == 0:
         start = Point(hypothesis.exact.point.x0[-1:], point.p)
         point = homotopy(judged, start, hypothesis.active, first=0.1).exact.point if problem.free_x0.any() else start
     Y = judged.run(point, 0.0, judged.layout(hypothesis.active)).Y
     return misfit.rmse(parts.judged, Y, list(problem.model.outputs), slice(parts.first, None))
+
+
+def idle(found: Search, named: Hypothesis) -> tuple[int, ...]:
+    """The effects of a hypothesis without which it predicts held-out data as well: nothing but the fit speaks for them.
+
+    Errors of all outputs are taken together in noise units; () where the record is too short to hold anything out.
+    """
+    problem = found.problem
+    parts = split(problem.record)
+    if parts is None or not named.active:
+        return ()
+    known = {frozenset(h.active): h for h in (found.base, *found.fitted)}
+    whole = _together(problem, held_out(problem, named, parts))
+    spared = []
+    for k in named.active:
+        rest = tuple(other for other in named.active if other != k)
+        without = known.get(frozenset(rest))
+        if without is None:
+            without = homotopy(problem, named.exact.point, rest, first=0.01, tolerance=0.1)
+        if _together(problem, held_out(problem, without, parts)) <= whole:
+            spared.append(k)
+    return tuple(spared)
+
+
+def _together(problem: Problem, error: dict[str, float]) -> float:
+    """Sum of squared errors in noise units; infinite where a simulation ran away."""
+    total = float(sum((value / sigma) ** 2 for value, sigma in zip(error.values(), np.sqrt(problem.R), strict=True)))
+    return total if np.isfinite(total) else np.inf

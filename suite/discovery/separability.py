@@ -64,7 +64,15 @@ def advice(found: Search, best: Hypothesis, rivals: Sequence[Hypothesis], verdic
 
 
 def smallest_detectable(found: Search, named: Hypothesis) -> dict[str, float]:
-    """The smallest coefficient of each candidate that these data would show in 95 of 100 records."""
+    """The smallest coefficient of each candidate that these data would show in 95 of 100 records.
+
+    Of a long record the block that was searched tells; so many times more samples show so much less.
+    """
+    if found.block is not None:
+        inside = [h for h in (found.block.base, *found.block.fitted) if set(h.active) == set(named.active)]
+        shown = smallest_detectable(found.block, inside[0]) if inside else {}
+        share = float(np.sqrt(found.block.problem.count / found.problem.count))
+        return {name: value * share for name, value in shown.items()}
     problem = found.problem
     if not named.exact.passed.finite:
         return {}

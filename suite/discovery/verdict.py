@@ -11,7 +11,8 @@ from suite.discovery.colour import coloured
 from suite.discovery.fit import Hypothesis, prepare
 from suite.discovery.identify import ALARM, Search, search
 from suite.discovery.library import candidates
-from suite.discovery.outcome import curve, describe, errors, parameters, residual
+from suite.discovery.long import LONG, search_long
+from suite.discovery.outcome import curve, describe, errors, idle, parameters, residual
 from suite.discovery.result import Candidate, Verdict
 from suite.discovery.weighing import Weighed, Weighing, excess, kind, size, weigh
 from suite.discovery.whiteness import ljung_box, whiteness
@@ -31,7 +32,8 @@ def diagnose(model: Model, record: Record, effects: Mapping[str, Effect], absolu
 def investigate(model: Model, record: Record, effects: Mapping[str, Effect], absolute: bool = False) -> Search:
     """Everything that was fitted to this record."""
     began = time.perf_counter()
-    found = coloured(search(prepare(model, record, candidates(model, effects, absolute))))
+    problem = prepare(model, record, candidates(model, effects, absolute))
+    found = search_long(problem) if len(record) > LONG else coloured(search(problem))
     return replace(found, seconds=time.perf_counter() - began)
 
 
@@ -42,6 +44,12 @@ def judge(found: Search) -> tuple[Verdict, Hypothesis]:
     weighing = weigh(found)
     said = kind(found, weighing)
     named = weighing.best.hypothesis if said in ("missing_effect", "ambiguous") else base
+    spared = idle(found, named) if said == "missing_effect" else ()
+    if spared:
+        # What is not fitted is not predicted any better by it: the fit alone is no proof.
+        said = "ambiguous" if base.gain > ALARM else "adequate"
+        named = named if said == "ambiguous" else base
+        weighing = weighing.doubted()
     pairs = _plausible(found, weighing, named) if said != "adequate" else []
     names = list(problem.model.outputs)
     correlations = whiteness(problem.record, problem.whitened(residual(problem, base.exact)), names)
@@ -57,6 +65,8 @@ def judge(found: Search) -> tuple[Verdict, Hypothesis]:
     advice: tuple[str, ...] = ()
     if said == "ambiguous":
         advice = separability.advice(found, named, [h for h, _ in pairs if h is not named], verdict)
+    if spared:
+        advice = (*advice, words.idle([problem.terms[k].effect.id for k in spared]))
     advice = (*advice, *determined.findings(problem, named.exact, named.layout))
     if problem.colour is not None:
         advice = (*advice, words.colour(names, problem.colour.tolist()))

@@ -5,13 +5,14 @@ that makes.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from suite.discovery.engine import Problem
 from suite.discovery.fit import Hypothesis, Level
 from suite.discovery.identify import ALARM, Search, needs_more
+from suite.discovery.library import triage
 from suite.discovery.result import Kind
 
 SURE = 0.9  # weight from which a verdict names one effect
@@ -42,6 +43,10 @@ class Weighing:
     def best(self) -> Weighed:
         """The likeliest."""
         return self.ranked[0]
+
+    def doubted(self) -> Weighing:
+        """The same with half of every weight given to none of the library."""
+        return replace(self, ranked=tuple(replace(entry, weight=0.5 * entry.weight) for entry in self.ranked))
 
 
 def weigh(found: Search) -> Weighing:
@@ -77,11 +82,14 @@ def same(problem: Problem, one: Hypothesis, other: Hypothesis) -> bool:
 
 
 def _merged(found: Search, members: list[Hypothesis], values: list[float], weights: list[float]) -> Weighed:
-    """One entry for hypotheses that are the same: physics before generic shapes, then the best criterion."""
+    """One entry for hypotheses that are the same: physics before generic shapes, the plant before its sensors, then
+    the best criterion.
+    """
     terms = found.problem.terms
 
-    def order(i: int) -> tuple[int, float]:
-        return sum(terms[k].effect.generic for k in members[i].active), values[i]
+    def order(i: int) -> tuple[int, int, float]:
+        own = [terms[k] for k in members[i].active]
+        return sum(term.effect.generic for term in own), sum(map(triage, own)), values[i]
 
     fewest = min(size(found.problem, h) for h in members)
     simple = [i for i, h in enumerate(members) if size(found.problem, h) == fewest]
@@ -91,8 +99,9 @@ def _merged(found: Search, members: list[Hypothesis], values: list[float], weigh
 
 
 def size(problem: Problem, hypothesis: Hypothesis) -> int:
-    """How many parameters a hypothesis has of its own."""
-    return sum(len(problem.terms[k].counted) for k in hypothesis.active)
+    """How many numbers a hypothesis has of its own, first values of its states among them."""
+    terms = [problem.terms[k] for k in hypothesis.active]
+    return sum(len(term.counted) + sum(z[2] for z in term.states.values()) for term in terms)
 
 
 def kind(found: Search, weighing: Weighing) -> Kind:

@@ -77,6 +77,14 @@ def value_sd(value: float, sd: float) -> str:
     return f"{value:.{digits}g} +- {sd:.2g}"
 
 
+def idle(effects: Sequence[str]) -> str:
+    """That held-out data do not speak for an effect."""
+    return (
+        f"On data held out of the fit the model predicts no better with {' or '.join(effects)} than without; "
+        "the fit alone is no proof."
+    )
+
+
 def colour(names: Sequence[str], rho: Sequence[float]) -> str:
     """That the sensors' noise has a memory."""
     parts = ", ".join(f"{value:.2f} ({name})" for name, value in zip(names, rho, strict=True))
