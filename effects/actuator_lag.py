@@ -9,7 +9,7 @@ EFFECT = Effect(
     sentence="The actuator follows its command with a first-order lag.",
     dimension="1",
     pinned=True,
-    inner={"w": Inner("step", 3.0, 0.1, 1e3, (1.0, 4.0, 15.0))},
+    inner={"w": Inner("step", 3.0, 1.0, 1e3, (1.0, 4.0, 15.0))},
     states={"z": Added("(u - z)/w", start="u", free=True)},
     family="the input acts otherwise than it is recorded",
 )

@@ -9,7 +9,7 @@ EFFECT = Effect(
     sentence="The sensor follows with a first-order lag.",
     dimension="1",
     pinned=True,
-    inner={"w": Inner("step", 3.0, 0.1, 1e3, (1.0, 4.0, 15.0))},
+    inner={"w": Inner("step", 3.0, 1.0, 1e3, (1.0, 4.0, 15.0))},
     states={"z": Added("(y - z)/w", start="y", free=True)},
     family="the measurement is at fault",
 )

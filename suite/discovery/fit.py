@@ -130,16 +130,23 @@ def levenberg_marquardt(
 
 
 def homotopy(
-    problem: Problem, point: Point, active: Sequence[int] = (), first: float = LEVELS[0], tolerance: float = 0.05
+    problem: Problem,
+    point: Point,
+    active: Sequence[int] = (),
+    first: float = LEVELS[0],
+    tolerance: float = 0.05,
+    rounds: int = 8,
 ) -> Hypothesis:
-    """Fit at every level from `first` down to 0, each started where the last ended; the last one converged."""
+    """Fit at every level from `first` down to 0, each started where the last ended; the last one converged, those on
+    the way in at most so many rounds.
+    """
     levels: list[Level] = []
     lowest = np.inf
     for q in (level for level in LEVELS if level <= first):
         last = q == 0.0
         if not last and levels and lowest + RISEN < levels[-1].L:
             continue
-        level = levenberg_marquardt(problem, point, q, active, 30 if last else 8, 1e-3 if last else tolerance)
+        level = levenberg_marquardt(problem, point, q, active, 30 if last else rounds, 1e-3 if last else tolerance)
         lowest = min(lowest, level.L)
         if last and not np.isfinite(level.L) and levels:
             # The simulation left the finite numbers: keep the last level that did not.

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from suite.discovery.engine import Point, Problem
-from suite.discovery.fit import LEVELS, Hypothesis, Level, homotopy, polish
+from suite.discovery.fit import LEVELS, RISEN, Hypothesis, Level, homotopy, polish
 from suite.discovery.library import incompatible
 from suite.discovery.noise import spans
 from suite.discovery.scoring import Score, absorbed, frequencies, is_tone, pairs, score
@@ -109,8 +109,9 @@ def refit(problem: Problem, parent: Hypothesis, active: tuple[int, ...], starts:
         point = Point(level.point.x0, p)
         for start in starts:
             point = brought(problem, point, start.k)
-        tried.append(homotopy(problem, point, active, first=q if q > 0 else LEVELS[-2], tolerance=0.1))
-        if pinned or (tried[-1].gain <= ALARM and np.isfinite(tried[-1].exact.L)):
+        tried.append(homotopy(problem, point, active, q if q > 0 else LEVELS[-2], 0.1, rounds=5))
+        # From zero only where the suggestion led nowhere.
+        if pinned or tried[-1].exact.L < min(parent.exact.L, parent.best.L + RISEN) - ALARM:
             break
     return min(tried, key=lambda hypothesis: hypothesis.exact.L)
 

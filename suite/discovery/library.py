@@ -19,6 +19,7 @@ from suite.effect import Effect
 from suite.model import Model
 
 CELSIUS = ("c", "degc", "celsius", "°c")
+FEW_STATES = 4  # up to which any three states are tried together
 KELVIN = ("k", "kelvin")
 SPEED = re.compile(r"(v|vx|vy|vz|w|omega|speed)\d*\Z")  # names of speeds whose position is no state
 ANGLE = re.compile(r"(th|theta|phi|psi|alpha|beta|gamma|angle)\d*\Z")
@@ -131,7 +132,11 @@ def _in_rate(model: Model, effect: Effect, equation: str, level: str | None, nam
     others = [s for s in model.states if s not in own] if "other" in wanted else [""]
     if "other" in wanted and effect.id == "product_coupling":
         others = [s for s in model.states if s != equation]
-    for other in others:
+    small = len(model.states) <= FEW_STATES
+    both = [(other, next((s for s in model.states if s not in (equation, other)), "")) for other in others]
+    if "another" in wanted and small:
+        both = [(o, s) for o in others for s in model.states if s not in (equation, o)] or both
+    for other, another in both:
         filled = {
             "position": position or "",
             "angle": position or "",
@@ -140,6 +145,7 @@ def _in_rate(model: Model, effect: Effect, equation: str, level: str | None, nam
             "content": equation,
             "any": equation,
             "other": other,
+            "another": another,
             "deviation": deviation,
             "temperature": f"({equation}{offset})",
             "level": f"({level}{offset})",
@@ -147,6 +153,9 @@ def _in_rate(model: Model, effect: Effect, equation: str, level: str | None, nam
         letters = {letter: filled[role] for letter, role in effect.roles.items()}
         variable = other or (position if wanted & {"position", "angle"} and position else equation)
         for form in (effect.term, *effect.forms):
+            third = [letter for letter, role in effect.roles.items() if role == "another" and letter in _words(form)]
+            if third and not (small and another):
+                continue
             yield _bound(effect, form, "rate", equation, "", letters, variable, names)
 
 

@@ -15,7 +15,7 @@ from suite.discovery.starts import brought
 Array = npt.NDArray[np.float64]
 
 LONG = 8192  # samples from which a record is searched in a block of it
-BLOCK = 3000  # samples of that block
+BLOCK = 2000  # samples of that block
 FINALISTS = 3  # hypotheses that are fitted to the whole record
 
 

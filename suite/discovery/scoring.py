@@ -22,6 +22,7 @@ from suite.discovery.terms import Term
 
 Array = npt.NDArray[np.float64]
 
+PEAKS = 10  # frequencies at which a tone is looked for
 FEW = 16  # only every so many-th frequency is looked at where no tone is searched
 COLLINEAR = 1e-3  # a candidate whose column the parameters explain to this is that parameter
 
@@ -53,24 +54,40 @@ def score(problem: Problem, hypothesis: Hypothesis, skip: Iterable[int] = (), ex
         return []
     at = min(range(len(levels)), key=lambda i: levels[i].L)
     for level in [levels[-1]] if exact else levels[max(at - 1, 0) : at + 2]:
-        for entry in _scores_at(problem, hypothesis, level, left_out, FEW if exact else int(level is levels[at])):
+        # A tone is looked for where the errors at the likeliest level repeat; elsewhere its size alone is asked for.
+        tones = frequencies(problem)[::FEW] if exact else _peaks(problem, level) if level is levels[at] else ()
+        for entry in _scores_at(problem, hypothesis, level, left_out, tones):
             if entry.k not in best or entry.LM > best[entry.k].LM:
                 best[entry.k] = entry
     return sorted(best.values(), key=lambda entry: -entry.LM)
 
 
 def _scores_at(
-    problem: Problem, hypothesis: Hypothesis, level: Level, left_out: set[int], tones: int
+    problem: Problem, hypothesis: Hypothesis, level: Level, left_out: set[int], tones: Iterable[float]
 ) -> Iterable[Score]:
-    """The scores at one level, over the tries of the inner scales; tones over every `tones`-th frequency (0: none)."""
+    """The scores at one level, over the tries of the inner scales; of tones at the frequencies of `tones`."""
     plain = [k for k, term in enumerate(problem.terms) if k not in left_out and not is_tone(term)]
     most = max((len(i.tries) for k in plain for i in problem.terms[k].inner.values()), default=1)
     for number in range(most):
         chosen = plain if number == 0 else [k for k in plain if problem.terms[k].inner]
         yield from _score_pass(problem, hypothesis, level, chosen, partial(_with_inner, problem, number))
     repeating = [k for k, term in enumerate(problem.terms) if k not in left_out and is_tone(term)]
-    for omega in frequencies(problem)[::tones] if tones and repeating else ():
+    for omega in tones if repeating else ():
         yield from _score_pass(problem, hypothesis, level, repeating, partial(_at_frequency, float(omega)))
+
+
+def _peaks(problem: Problem, level: Level) -> Array:
+    """The frequencies at which the errors of a level repeat most, (PEAKS,) at most."""
+    every = frequencies(problem)
+    t = np.broadcast_to(problem.record.t[:, None], problem.seen.shape)[problem.seen]
+    power = np.zeros(len(every))
+    for part in np.array_split(np.arange(len(t)), max(1, len(t) // 4096)):
+        waves = np.exp(-1j * np.outer(every, t[part]))
+        power = power + waves @ level.passed.e[part]
+    size = np.abs(power)
+    padded = np.concatenate([[0.0], size, [0.0]])
+    tops = np.flatnonzero((size >= padded[:-2]) & (size >= padded[2:]))
+    return every[tops[np.argsort(-size[tops])][:PEAKS]]
 
 
 def _at_frequency(omega: float, k: int) -> Array:
@@ -222,8 +239,9 @@ def _projected(
     A = np.vstack([A, rows])
     norms = np.sqrt((A**2).sum(axis=0))
     A = A[:, norms > 0] / norms[norms > 0]
-    U, singular, _ = np.linalg.svd(A, full_matrices=False)
-    U = U[:, singular > 1e-10 * singular[0]] if len(singular) else U
+    values, vectors = np.linalg.eigh(A.T @ A)
+    kept = values > 1e-14 * values.max(initial=0.0)
+    U = A @ (vectors[:, kept] / np.sqrt(values[kept]))
     whole = np.vstack([np.column_stack([passed.e, C]), np.zeros((len(own), 1 + C.shape[1]))])
     whole = whole - U @ (U.T @ whole)
     return whole[:, 0], whole[:, 1:], C

@@ -47,7 +47,6 @@ class TameLog(sympy.Function):  # type: ignore[misc]
     is_real = True
 
 
-
 @dataclass(frozen=True)
 class Gate:
     """A term that can be switched on: what it adds to rates and outputs (by index), and the states that it brings
@@ -318,7 +317,9 @@ def _derivative(expression: sympy.Expr, by: sympy.Symbol) -> sympy.Expr:
         and not expression.has(e),
         lambda e: TamePower(e.base, e.exp),
     )  # fmt: skip
-    tamed: sympy.Expr = slope.replace(lambda e: e.func is sympy.log and not expression.has(e), lambda e: TameLog(*e.args))
+    tamed: sympy.Expr = slope.replace(
+        lambda e: e.func is sympy.log and not expression.has(e), lambda e: TameLog(*e.args)
+    )
     return tamed
 
 

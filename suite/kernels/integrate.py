@@ -103,14 +103,21 @@ def advance(
                         Ts[i, j] = T[i, j] + offset * k[i, j]
                 rate(t + done + offset, xs, us, p, on, f, Fx, Fp)
             weight = 1.0 if stage == 0 or stage == 3 else 2.0
+            Tn = T if stage == 0 else Ts
             for i in range(n):
                 dx[i] = f[i] if stage == 0 else dx[i] + weight * f[i]
+                # k = F_x T + F_p, row by row: most rates depend on few states.
+                for j in range(n):
+                    k[i, j] = 0.0
+                for j in range(m):
+                    k[i, n + j] = Fp[i, columns[j]]
+                for l in range(n):
+                    slope = Fx[i, l]
+                    if slope != 0.0:
+                        for j in range(width):
+                            k[i, j] += slope * Tn[l, j]
                 for j in range(width):
-                    slope = Fp[i, columns[j - n]] if j >= n else 0.0
-                    for l in range(n):
-                        slope += Fx[i, l] * (T[l, j] if stage == 0 else Ts[l, j])
-                    k[i, j] = slope
-                    total[i, j] = slope if stage == 0 else total[i, j] + weight * slope
+                    total[i, j] = k[i, j] if stage == 0 else total[i, j] + weight * k[i, j]
         for i in range(n):
             x[i] += h / 6.0 * dx[i]
             for j in range(width):

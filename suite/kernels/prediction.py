@@ -62,11 +62,15 @@ def prediction_errors(
                 advance(rate, t[step - 1], dt, u[step - 1], u[step], linear, p, on, columns, substeps, xv, T, work)
                 # S <- Phi S + [0 | G]
                 for i in range(n):
-                    for j in range(width):
-                        total = T[i, j] if j >= n else 0.0
-                        for l in range(n):
-                            total += T[i, l] * S[l, j]
-                        S2[i, j] = total
+                    for j in range(n):
+                        S2[i, j] = 0.0
+                    for j in range(n, width):
+                        S2[i, j] = T[i, j]
+                    for l in range(n):
+                        slope = T[i, l]
+                        if slope != 0.0:
+                            for j in range(width):
+                                S2[i, j] += slope * S[l, j]
                 for i in range(n):
                     for j in range(width):
                         S[i, j] = S2[i, j]
@@ -74,10 +78,12 @@ def prediction_errors(
                     # P <- Phi P Phi' + Q dt
                     for i in range(n):
                         for j in range(n):
-                            total = 0.0
-                            for l in range(n):
-                                total += T[i, l] * P[l, j]
-                            P2[i, j] = total
+                            P2[i, j] = 0.0
+                        for l in range(n):
+                            slope = T[i, l]
+                            if slope != 0.0:
+                                for j in range(n):
+                                    P2[i, j] += slope * P[l, j]
                     for i in range(n):
                         for j in range(i + 1):
                             total = 0.0
@@ -117,11 +123,15 @@ def prediction_errors(
                 s[step, c] = variance
                 if not math.isfinite(e[step, c]):
                     return step
-                for j in range(width):
-                    slope = Hp[c, columns[j - n]] if j >= n else 0.0
-                    for i in range(n):
-                        slope += Hx[c, i] * S[i, j]
-                    J[step, c, j] = -slope / root
+                for j in range(n):
+                    J[step, c, j] = 0.0
+                for j in range(m):
+                    J[step, c, n + j] = -Hp[c, columns[j]] / root
+                for i in range(n):
+                    slope = Hx[c, i] / root
+                    if slope != 0.0:
+                        for j in range(width):
+                            J[step, c, j] -= slope * S[i, j]
                 if noisy:
                     for i in range(n):
                         gain = K[i] / variance
