@@ -111,7 +111,7 @@ def refit(problem: Problem, parent: Hypothesis, active: tuple[int, ...], starts:
             point = brought(problem, point, start.k)
         tried.append(homotopy(problem, point, active, q if q > 0 else LEVELS[-2], 0.1, rounds=5))
         # From zero only where the suggestion led nowhere.
-        if pinned or tried[-1].exact.L < min(parent.exact.L, parent.best.L + RISEN) - ALARM:
+        if pinned or min(parent.exact.L, parent.best.L + RISEN) - ALARM > tried[-1].exact.L:
             break
     return min(tried, key=lambda hypothesis: hypothesis.exact.L)
 

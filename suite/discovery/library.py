@@ -14,44 +14,47 @@ from dataclasses import dataclass, field
 import sympy
 
 from suite import expressions
+from suite.discovery import roles
 from suite.discovery.terms import Place, Term
 from suite.effect import Effect
 from suite.model import Model
+from suite.record import Record
 
-CELSIUS = ("c", "degc", "celsius", "°c")
 FEW_STATES = 4  # up to which any three states are tried together
-KELVIN = ("k", "kelvin")
 SPEED = re.compile(r"(v|vx|vy|vz|w|omega|speed)\d*\Z")  # names of speeds whose position is no state
-ANGLE = re.compile(r"(th|theta|phi|psi|alpha|beta|gamma|angle)\d*\Z")
 # Roles of everything that is no state; they say where the effect acts.
 ELSEWHERE: Mapping[str, Place] = {
     "output": "output", "input": "input", "parameter": "parameter", "fixed": "parameter", "clock": "clock",
 }  # fmt: skip
 
 
-def candidates(model: Model, effects: Mapping[str, Effect], absolute: bool = False) -> tuple[Term, ...]:
+def candidates(
+    model: Model, effects: Mapping[str, Effect], absolute: bool = False, record: Record | None = None
+) -> tuple[Term, ...]:
     """Every effect wherever its roles are played: in the suspect equations, and in measurements, inputs, parameters.
 
     The model's symmetries are kept: where no equation depends on a state's absolute value (height in free fall), no
-    candidate of a rate may either, unless `absolute`. Of two candidates of the same shape in one equation the first
+    candidate of a rate may either, unless `absolute`, or unless the `record` shows it going to and fro about its zero,
+    which then means something. Of two candidates of the same shape in one equation the first
     stays, physics before a generic stand-in. The model's own effects come first; one that names its equation acts there
     whatever is suspect.
     """
     effects = {effect.id: effect for effect in model.effects} | dict(effects)
     used = set().union(*(rate.free_symbols for rate in model.rates))
-    hidden = set() if absolute else {expressions.symbol(s) for s in model.states} - used
+    centred = roles.centred(model, record) if record is not None else set()
+    hidden = set() if absolute else {s for s in model.states if expressions.symbol(s) not in used} - centred
     names = Names(model)
     found: dict[tuple[str, sympy.Expr], Term] = {}
     for term in _where_it_says(model, names):
         shape = _shape(term, names)
         found[(term.equation, shape if _positive(shape) else -shape)] = term
     for equation in model.suspects:
-        level = _level(model, equation)
+        level = roles.level(model, equation)
         own = [term for effect in effects.values() for term in _in_rate(model, effect, equation, level, names)]
         for term in sorted(own, key=lambda term: term.effect.generic):
             shape = _shape(term, names)
             texts = [term.text, *(z[0] for z in term.states.values())]
-            if not {s.name for s in hidden} & set().union(*map(_words, texts)):
+            if not hidden & set().union(*map(_words, texts)):
                 found.setdefault((equation, shape if _positive(shape) else -shape), term)
     elsewhere = [term for effect in effects.values() for term in _elsewhere(model, effect, names)]
     return (*found.values(), *elsewhere)
@@ -117,12 +120,12 @@ def _in_rate(model: Model, effect: Effect, equation: str, level: str | None, nam
         return
     if "rate" in wanted and not (mechanical or SPEED.match(equation)):
         return
-    if "angle" in wanted and not _is_angle(model, position or ""):
+    if "angle" in wanted and not roles.is_angle(model, position or ""):
         return
     if wanted & {"state", "content"} and mechanical:
         return
     deviation = f"({equation} - {level})" if level else equation
-    kelvin = _kelvin(model, equation, level)
+    kelvin = roles.kelvin(model, equation, level)
     if "content" in wanted and kelvin is not None:
         return
     if wanted & {"temperature", "level"} and (kelvin is None or ("level" in wanted and level is None)):
@@ -177,22 +180,13 @@ def _elsewhere(model: Model, effect: Effect, names: Names) -> Iterator[Term]:
                     yield _bound(effect, form, "input", name, name, letters, name, names)
     elif role in ("parameter", "fixed"):
         for name, parameter in model.parameters.items():
-            where = _stands_in(model, name)
+            where = roles.stands_in(model, name)
             if where and parameter.value != 0 and (role == "parameter" or parameter.fixed):
                 for form in forms:
                     yield _bound(effect, form, "parameter", where, name, {letter: name}, name, names)
     elif role == "clock":
         for form in forms:
             yield _bound(effect, form, "clock", "t", "t", {letter: "1"}, "t", names)
-
-
-def _stands_in(model: Model, name: str) -> str | None:
-    """The first suspect equation, else the first output, that the parameter stands in."""
-    s = expressions.symbol(name)
-    order = list(model.states)
-    rates = [e for e in model.suspects if s in model.rates[order.index(e)].free_symbols]
-    outputs = [o for o, e in zip(model.outputs, model.output_expressions, strict=True) if s in e.free_symbols]
-    return next(iter([*rates, *outputs]), None)
 
 
 def _bound(
@@ -225,48 +219,6 @@ def renamed(text: str, names: Mapping[str, str]) -> str:
 
 def _words(text: str) -> set[str]:
     return set(re.findall(r"[A-Za-z_]\w*", text))
-
-
-def _level(model: Model, equation: str) -> str | None:
-    """The parameter or input that this state relaxes to: the rate depends on (x - A) alone."""
-    rate = model.rates[list(model.states).index(equation)]
-    x = expressions.symbol(equation)
-    by_x = sympy.diff(rate, x)
-    if by_x == 0:
-        return None
-    for name in (*model.parameters, *model.inputs):
-        level = expressions.symbol(name)
-        if level in rate.free_symbols and sympy.expand(by_x + sympy.diff(rate, level)) == 0:
-            return name
-    return None
-
-
-def _is_angle(model: Model, state: str) -> bool:
-    """Whether a position is an angle: by its unit, by its output, or by its name."""
-    unit = model.units.get(state)
-    if unit is not None:
-        return unit.strip().lower() in ("rad", "radian", "radians")
-    turning = any(output.angle and output.equation.strip() == state for output in model.outputs.values())
-    return turning or bool(ANGLE.match(state))
-
-
-def _kelvin(model: Model, equation: str, level: str | None) -> float | None:
-    """What to add for kelvin if this state is a temperature (0 or 273.15), None if it is none.
-
-    The unit of the level decides; without a unit, a state named T, T1, temp... is one, in kelvin if its level or
-    first value is above 200.
-    """
-    parameter = model.parameters.get(level) if level else None
-    unit = (parameter.unit or "").strip().lower() if parameter else ""
-    unit = unit or model.units.get(equation, "").strip().lower()
-    if unit in CELSIUS:
-        return 273.15
-    if unit in KELVIN:
-        return 0.0
-    if not re.match(r"(T\d*$|T_|temp)", equation):
-        return None
-    value = parameter.value if parameter else (model.initial[equation].value if equation in model.initial else 0.0)
-    return 0.0 if value > 200 else 273.15
 
 
 def triage(term: Term) -> bool:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from suite.discovery import misfit
 from suite.discovery.discrepancy import discrepancy
-from suite.discovery.fit import Hypothesis, summarise
+from suite.discovery.fit import summarise
 from suite.discovery.identify import Search
 from suite.discovery.outcome import amended
 from suite.discovery.result import Ledger, Step, Verdict

@@ -32,7 +32,7 @@ def diagnose(model: Model, record: Record, effects: Mapping[str, Effect], absolu
 def investigate(model: Model, record: Record, effects: Mapping[str, Effect], absolute: bool = False) -> Search:
     """Everything that was fitted to this record."""
     began = time.perf_counter()
-    problem = prepare(model, record, candidates(model, effects, absolute))
+    problem = prepare(model, record, candidates(model, effects, absolute, record))
     found = search_long(problem) if len(record) > LONG else coloured(search(problem))
     return replace(found, seconds=time.perf_counter() - began)
 
