@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from suite.discovery.engine import Point, Problem
-from suite.discovery.fit import LEVELS, Hypothesis, homotopy, polish
+from suite.discovery.fit import LEVELS, Hypothesis, homotopy
 from suite.discovery.identify import Search, search
 from suite.discovery.starts import brought
 
@@ -16,19 +16,19 @@ Array = npt.NDArray[np.float64]
 
 LONG = 8192  # samples from which a record is searched in a block of it
 BLOCK = 2000  # samples of that block
-FINALISTS = 3  # hypotheses that are fitted to the whole record
+FINALISTS = 2  # hypotheses that are fitted to the whole record
 
 
 def search_long(problem: Problem) -> Search:
     """The search on one block, its best hypotheses fitted to the whole record; `block` keeps the search itself."""
-    base = polish(problem, homotopy(problem, problem.start))
+    base = homotopy(problem, problem.start)
     small = _block(problem, base)
     found = search(small)
     ranked = sorted(found.fitted, key=found.criterion)[:FINALISTS]
     # What the best is made of stands beside it, so that every part must earn its place on the whole record too.
     parts = [h for h in found.fitted if ranked and len(h.active) == 1 and h.active[0] in ranked[0].active]
     chosen = {frozenset(h.active): h for h in (*ranked, *parts)}
-    fitted = [polish(problem, _whole(problem, base, h)) for h in chosen.values()]
+    fitted = [_whole(problem, base, h) for h in chosen.values()]
     return Search(problem, base, tuple(fitted), found.absorbed, found.frequencies, found.scores, block=found)
 
 
@@ -66,4 +66,4 @@ def _whole(problem: Problem, base: Hypothesis, hypothesis: Hypothesis) -> Hypoth
     point = Point(base.exact.point.x0 if base.exact.passed.finite else base.best.point.x0, hypothesis.exact.point.p)
     for k in hypothesis.active:
         point = brought(problem, point, k)
-    return homotopy(problem, point, hypothesis.active, first=LEVELS[-4], tolerance=0.1)
+    return homotopy(problem, point, hypothesis.active, first=LEVELS[-2], tolerance=1.0)

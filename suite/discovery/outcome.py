@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from suite.discovery import misfit
 from suite.discovery.engine import Point, Problem
-from suite.discovery.fit import Hypothesis, Level, covariance, homotopy, summarise
+from suite.discovery.fit import LEVELS, Hypothesis, Level, covariance, homotopy, summarise
 from suite.discovery.hold_out import Split, split
 from suite.discovery.identify import Search
 from suite.discovery.result import Coefficient, Named
@@ -18,6 +18,9 @@ from suite.model import Model, Parameter
 from suite.units import brought
 
 Array = npt.NDArray[np.float64]
+
+
+MANY, CALM = 8192, LEVELS[-2]  # samples from which the whole record's fit is a good enough start, and its level
 
 
 def residual(problem: Problem, level: Level) -> Array:
@@ -106,10 +109,17 @@ def errors(found: Search, named: Hypothesis) -> dict[str, Any]:
     parts = split(problem.record)
     if parts is None:
         return error
-    held: dict[str, dict[str, float]] = {}
-    for label, hypothesis in (("before", found.base), ("after", named)):
-        held[label] = held_out(problem, hypothesis, parts)
-    return {**error, "held_out": held}
+    both = {"before": _held(found, found.base, parts), "after": _held(found, named, parts)}
+    return {**error, "held_out": both}
+
+
+def _held(found: Search, hypothesis: Hypothesis, parts: Split) -> dict[str, float]:
+    """`held_out`, once for each hypothesis of a search."""
+    known: dict[frozenset[int], dict[str, float]] = found.__dict__.setdefault("_held", {})
+    key = frozenset(hypothesis.active)
+    if key not in known:
+        known[key] = held_out(found.problem, hypothesis, parts)
+    return known[key]
 
 
 def held_out(problem: Problem, hypothesis: Hypothesis, parts: Split) -> dict[str, float]:
@@ -122,7 +132,9 @@ def held_out(problem: Problem, hypothesis: Hypothesis, parts: Split) -> dict[str
     p = hypothesis.exact.point.p
     x0 = hypothesis.exact.point.x0[:runs]
     train = problem.on(parts.train, Point(x0, problem.start.p))
-    point = homotopy(train, Point(x0, p), hypothesis.active, first=1e-3).exact.point
+    point = homotopy(
+        train, Point(x0, p), hypothesis.active, first=CALM if len(problem.record) > MANY else 1e-3
+    ).exact.point
     judged = problem.on(parts.judged, problem.start, frozen=True)
     if parts.first == 0:
         start = Point(hypothesis.exact.point.x0[-1:], point.p)
@@ -141,14 +153,14 @@ def idle(found: Search, named: Hypothesis) -> tuple[int, ...]:
     if parts is None or not named.active:
         return ()
     known = {frozenset(h.active): h for h in (found.base, *found.fitted)}
-    whole = _together(problem, held_out(problem, named, parts))
+    whole = _together(problem, _held(found, named, parts))
     spared = []
     for k in named.active:
         rest = tuple(other for other in named.active if other != k)
         without = known.get(frozenset(rest))
         if without is None:
             without = homotopy(problem, named.exact.point, rest, first=0.01, tolerance=0.1)
-        if _together(problem, held_out(problem, without, parts)) <= whole:
+        if _together(problem, _held(found, without, parts)) <= whole:
             spared.append(k)
     return tuple(spared)
 

@@ -38,24 +38,35 @@ def distance(problem: Problem, winner: Hypothesis, rival: Hypothesis, known: Seq
     return float((level.passed.e**2).sum() / scale) if level.passed.finite else np.inf
 
 
+def apart(found: Search, winner: Hypothesis, rival: Hypothesis) -> float:
+    """The distance on the searched record; of a long one as the block that was searched tells, times its length."""
+    if found.block is None:
+        return distance(found.problem, winner, rival)
+    inside = {frozenset(h.active): h for h in (found.block.base, *found.block.fitted)}
+    both = [inside.get(frozenset(h.active)) for h in (winner, rival)]
+    if both[0] is None or both[1] is None:
+        return np.inf
+    return distance(found.block.problem, both[0], both[1]) * found.problem.count / found.block.problem.count
+
+
 def advice(found: Search, best: Hypothesis, rivals: Sequence[Hypothesis], verdict: Verdict) -> tuple[str, ...]:
     """What would tell the best from its nearest plausible rival: more data, or a parameter known better."""
     problem = found.problem
     said = []
     if rivals:
-        apart, rival = min(((distance(problem, best, h), h) for h in rivals[:SHOWN]), key=lambda pair: pair[0])
+        gap, rival = min(((apart(found, best, h), h) for h in rivals[:SHOWN]), key=lambda pair: pair[0])
         names = [[problem.terms[k].effect.id for k in h.active] for h in (best, rival)]
-        if apart < SEPARABLE:
-            times = f"about {SEPARABLE / apart:.2g} times the data" if apart > 0.1 else "no amount of the same data"
-            said.append(words.separate(names[0], names[1], apart, times))
+        if gap < SEPARABLE:
+            times = f"about {SEPARABLE / gap:.2g} times the data" if gap > 0.1 else "no amount of the same data"
+            said.append(words.separate(names[0], names[1], gap, times))
         gains = [
             (distance(problem, best, rival, [name]), name)
             for name, parameter in problem.model.parameters.items()
-            if parameter.prior_sd > 0
+            if parameter.prior_sd > 0 and found.block is None and gap < SEPARABLE
         ]
-        if gains and apart < SEPARABLE and max(gains)[0] > max(2.0 * apart, SEPARABLE / 2):
+        if gains and max(gains)[0] > max(2.0 * gap, SEPARABLE / 2):
             said.append(
-                f"Knowing {max(gains)[1]} exactly would raise the separation from {apart:.2g} to {max(gains)[0]:.2g} "
+                f"Knowing {max(gains)[1]} exactly would raise the separation from {gap:.2g} to {max(gains)[0]:.2g} "
                 f"({SEPARABLE:g} is enough to tell)."
             )
     if best.gain > ALARM:

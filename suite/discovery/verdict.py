@@ -64,7 +64,8 @@ def judge(found: Search) -> tuple[Verdict, Hypothesis]:
     )  # fmt: skip
     advice: tuple[str, ...] = ()
     if said == "ambiguous":
-        advice = separability.advice(found, named, [h for h, _ in pairs if h is not named], verdict)
+        rivals = [h for h, _ in pairs if h is not named and size(problem, h) <= size(problem, named)]
+        advice = separability.advice(found, named, rivals, verdict)
     if spared:
         advice = (*advice, words.idle([problem.terms[k].effect.id for k in spared]))
     advice = (*advice, *determined.findings(problem, named.exact, named.layout))
@@ -89,7 +90,7 @@ def _plausible(found: Search, weighing: Weighing, named: Hypothesis) -> list[tup
         if hypothesis.active and hypothesis.exact.passed.finite:
             separation = None
             if hypothesis is not best and place <= separability.SHOWN and best.active:
-                separation = separability.distance(problem, best, hypothesis)
+                separation = separability.apart(found, best, hypothesis)
             # What contains the best as a special case is never far from it; its weight alone speaks for it.
             simple = size(problem, hypothesis) <= size(problem, best)
             near = simple and separation is not None and separation < separability.SEPARABLE

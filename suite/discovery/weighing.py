@@ -51,7 +51,7 @@ class Weighing:
 
 def weigh(found: Search) -> Weighing:
     """Weights ~ exp(-EBIC/2), twins merged; where something remains, compared with it as process noise."""
-    everything = [found.base, *found.fitted]
+    everything = [found.base, *(h for h in found.fitted if not _hollow(found.problem, h))]
     settled = not needs_more(found, min(everything, key=found.criterion))
     if not settled:
         everything = _thrifty(found, everything)
@@ -70,6 +70,15 @@ def weigh(found: Search) -> Weighing:
             home.append(int(i))
     ranked = [_merged(found, [everything[i] for i in g], [values[i] for i in g], weights[g].tolist()) for g in groups]
     return Weighing(tuple(sorted(ranked, key=lambda entry: -entry.weight)), settled)
+
+
+def _hollow(problem: Problem, hypothesis: Hypothesis) -> bool:
+    """Whether a coefficient that cannot be negative ended at zero: a simpler hypothesis says the same."""
+    p = hypothesis.exact.point.p
+    return any(
+        term.effect.sign and (p[problem.places(k)[: len(term.coefficients)]] == 0.0).any()
+        for k, term in ((k, problem.terms[k]) for k in hypothesis.active)
+    )
 
 
 def same(problem: Problem, one: Hypothesis, other: Hypothesis) -> bool:
