@@ -142,11 +142,13 @@ def homotopy(
     """
     levels: list[Level] = []
     lowest = np.inf
+    # Of a long record the criterion itself is large, and so is what its last digits cost.
+    finest = 1e-3 * max(1.0, problem.count / 1000.0)
     for q in (level for level in LEVELS if level <= first):
         last = q == 0.0
         if not last and levels and lowest + RISEN < levels[-1].L:
             continue
-        level = levenberg_marquardt(problem, point, q, active, 30 if last else rounds, 1e-3 if last else tolerance)
+        level = levenberg_marquardt(problem, point, q, active, 30 if last else rounds, finest if last else tolerance)
         lowest = min(lowest, level.L)
         if last and not np.isfinite(level.L) and levels:
             # The simulation left the finite numbers: keep the last level that did not.

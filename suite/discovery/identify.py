@@ -116,7 +116,7 @@ def refit(problem: Problem, parent: Hypothesis, active: tuple[int, ...], starts:
     return min(tried, key=lambda hypothesis: hypothesis.exact.L)
 
 
-def _left(hypothesis: Hypothesis) -> float:
+def left(hypothesis: Hypothesis) -> float:
     """The mean squared error of the exact simulation, in noise units; infinite where it runs away."""
     passed = hypothesis.exact.passed
     return float(np.mean(passed.e**2)) if passed.finite else np.inf
@@ -170,6 +170,6 @@ def _grow(found: Search) -> Search:
         grown = min(known.values(), key=found.criterion)
         if found.criterion(grown) >= found.criterion(best) or not needs_more(found, grown):
             break
-        if _left(grown) > WORTH * _left(best):
+        if left(grown) > WORTH * left(best):
             break
     return replace(found, fitted=tuple(known.values()))

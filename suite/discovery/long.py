@@ -9,14 +9,14 @@ import numpy.typing as npt
 
 from suite.discovery.engine import Point, Problem
 from suite.discovery.fit import LEVELS, Hypothesis, homotopy
-from suite.discovery.identify import Search, search
+from suite.discovery.identify import WORTH, Search, left, search
 from suite.discovery.starts import brought
 
 Array = npt.NDArray[np.float64]
 
 LONG = 8192  # samples from which a record is searched in a block of it
 BLOCK = 2000  # samples of that block
-FINALISTS = 2  # hypotheses that are fitted to the whole record
+FINALISTS = 2  # effects that are fitted to the whole record, and the best combination where it is worth it
 
 
 def search_long(problem: Problem) -> Search:
@@ -24,11 +24,12 @@ def search_long(problem: Problem) -> Search:
     base = homotopy(problem, problem.start)
     small = _block(problem, base)
     found = search(small)
-    ranked = sorted(found.fitted, key=found.criterion)[:FINALISTS]
-    # What the best is made of stands beside it, so that every part must earn its place on the whole record too.
-    parts = [h for h in found.fitted if ranked and len(h.active) == 1 and h.active[0] in ranked[0].active]
-    chosen = {frozenset(h.active): h for h in (*ranked, *parts)}
-    fitted = [_whole(problem, base, h) for h in chosen.values()]
+    singles = sorted((h for h in found.fitted if len(h.active) == 1), key=found.criterion)[:FINALISTS]
+    best = min(found.fitted, key=found.criterion, default=None)
+    finalists = list(singles)
+    if best is not None and len(best.active) > 1 and left(best) < WORTH * min(map(left, singles)):
+        finalists.append(best)
+    fitted = [_whole(problem, base, h) for h in finalists]
     return Search(problem, base, tuple(fitted), found.absorbed, found.frequencies, found.scores, block=found)
 
 

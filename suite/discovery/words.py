@@ -56,7 +56,8 @@ def _several(verdict: Verdict) -> str:
     more = f" and {len(rivals) - 5} more" if len(rivals) > 5 else ""
     rest = 1.0 - sum(candidate.weight for candidate in verdict.plausible)
     none = f"; or none of these ({weight(rest)})" if rest > 0.02 else ""
-    return f"An effect is missing; plausible: {', '.join(rivals[:5])}{more}{none}."
+    opening = "An effect is missing; plausible: " if len(rivals) > 1 else "An effect is missing; most likely "
+    return f"{opening}{', '.join(rivals[:5])}{more}{none}."
 
 
 def effect(named: Named) -> str:
@@ -148,5 +149,5 @@ def _family(verdict: Verdict, problem: Problem) -> str:
     families = {term.effect.id: term.effect.family for term in problem.terms}
     shared = [{families[named.effect] for named in candidate.effects} - {""} for candidate in verdict.plausible]
     shared = [family for family in shared if family]
-    common = set.intersection(*shared) if shared else set()
+    common = set.intersection(*shared) if len(shared) > 1 else set()
     return next((re.sub(r"\s+", " ", text) for text in sorted(common) if text), "")
