@@ -13,6 +13,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
+from suite.delays import acting
+from suite.discovery.chaos import stretches
 from suite.discovery.engine import Index, Layout, Pass, Point, Problem
 from suite.discovery.noise import noise_variance, without_outliers
 from suite.discovery.starts import brought, check_record, first_states, pace_of, rough_path, start_of
@@ -199,6 +201,11 @@ def prepare(model: Model, record: Record, terms: tuple[Term, ...] = ()) -> Probl
         if level.passed.finite:
             path = level.passed.X
             x0 = level.point.x0
+    cut = stretches(model, acting(record, model), path)
+    if len(cut.starts) > len(record.starts):
+        record = replace(record, starts=cut.starts, names=cut.names)
+        x0, free = path[list(cut.starts)].copy(), np.ones_like(free)
+        problem = replace(problem, record=record, free_x0=free)
     problem = replace(problem, path=path, weights=pace_of(model, record, path), start=Point(x0, model.values))
     full = replace(problem, substeps=_substeps(problem), terms=terms)
     p = np.concatenate([model.values, *(start_of(full, term) for term in terms)])

@@ -1,0 +1,63 @@
+"""Plants that forget where they started: a record is cut where no simulation could reach back further.
+
+Along the measured path the tangent of the model tells how fast two neighbouring runs part. Beyond FORGOTTEN no first
+state can be known well enough for an exact simulation of the whole; the record is then taken in stretches over which
+they part by PARTED at most, each with a first state of its own (multiple shooting; Bock 1981).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from suite.kernels.integrate import transition
+from suite.model import Model
+from suite.record import Record
+
+Array = npt.NDArray[np.float64]
+
+FORGOTTEN = 30.0  # logarithm of how far neighbours part over a run, from which it is cut
+PARTED = 8.0  # the same over a stretch
+SHORTEST = 40  # samples of a stretch
+
+
+def stretches(model: Model, record: Record, path: Array) -> Record:
+    """The record with the runs that no simulation can span cut into stretches; itself where there are none.
+
+    `path` (N, n) are the states at the samples.
+    """
+    starts: list[int] = []
+    names: list[str] = []
+    for number, (first, last) in enumerate(zip(record.bounds[:-1].tolist(), record.bounds[1:].tolist(), strict=True)):
+        growth = _growth(model, record, path, first, last)
+        cuts = [first]
+        if growth[-1] > FORGOTTEN:
+            for k in range(first + 1, last - SHORTEST):
+                if growth[k - first] - growth[cuts[-1] - first] > PARTED and k - cuts[-1] >= SHORTEST:
+                    cuts.append(k)
+        starts += cuts
+        name = record.names[number] if len(record.names) == len(record.starts) else record.source
+        names += [f"{name}, from t = {record.t[k]:.4g}" for k in cuts] if len(cuts) > 1 else [name]
+    return replace(record, starts=tuple(starts), names=tuple(names)) if len(starts) > len(record.starts) else record
+
+
+def _growth(model: Model, record: Record, path: Array, first: int, last: int) -> Array:
+    """Logarithm of the factor by which neighbours part from a run's first sample on, (samples,)."""
+    n = len(model.states)
+    V, total = np.eye(n), 0.0
+    scale = np.ptp(path[first:last], axis=0)
+    scale = np.where(scale > 0, scale, 1.0)
+    growth = np.zeros(last - first)
+    p, linear = model.values, model.linear_inputs
+    for k in range(first, last - 1):
+        dt = float(record.t[k + 1] - record.t[k])
+        _, Phi = transition(model.program, record.t[k], path[k], record.u[k], record.u[k + 1], linear, p, dt)
+        V = (Phi * scale / scale[:, None]) @ V
+        size = float(np.linalg.norm(V, 2))
+        if not np.isfinite(size) or size == 0.0:
+            return growth
+        V, total = V / size, total + np.log(size)
+        growth[k + 1 - first] = total
+    return np.maximum.accumulate(growth)
