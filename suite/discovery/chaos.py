@@ -18,8 +18,8 @@ from suite.record import Record
 
 Array = npt.NDArray[np.float64]
 
-FORGOTTEN = 30.0  # logarithm of how far neighbours part over a run, from which it is cut
-PARTED = 8.0  # the same over a stretch
+FORGOTTEN = 8.0  # logarithm of how far neighbours part over a run, from which it is cut
+PARTED = 3.0  # the same over a stretch
 SHORTEST = 40  # samples of a stretch
 
 

@@ -24,7 +24,7 @@ NEXT = 5  # second effects refitted for each of them
 CLOSE = 25.0  # rivals within this of the best are converged before weights are formed
 ALARM = 9.0  # Lambda above which the model fails
 WORTH = 0.7  # of the error's variance: what a further effect must leave less than, for yet another to be sought
-PAIRS = 5  # pairs that are refitted because they help together
+PAIRS = 4  # pairs that are refitted because they help together, at each of two levels
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +163,7 @@ def _grow(found: Search) -> Search:
             rest = tuple(other for other in grown.active if other != k)
             if frozenset(rest) not in known:
                 known[frozenset(rest)] = homotopy(problem, grown.exact.point, rest, first=0.01, tolerance=0.1)
-            for entry in score(problem, known[frozenset(rest)], skip=found.absorbed)[:2]:
+            for entry in score(problem, known[frozenset(rest)], skip=found.absorbed)[:3]:
                 extend(known[frozenset(rest)], [entry])
         fitted = _converged(found, list(known.values()))
         known = {frozenset(hypothesis.active): hypothesis for hypothesis in fitted}

@@ -186,11 +186,25 @@ def _solved(problem: Problem, found: Columns, members: Sequence[int]) -> tuple[A
 
 
 def pairs(problem: Problem, base: Hypothesis, scores: Sequence[Score], most: int) -> list[tuple[Score, Score]]:
-    """The pairs that would explain most together, whatever each does alone, at the base model's likeliest level."""
-    level = base.best
+    """The pairs that would explain most together, whatever each does alone: `most` at the base model's likeliest level,
+    where they disturb least, and as many two decades below, where they show most.
+    """
     inner = {s.k: s.p[len(problem.terms[s.k].coefficients) :] for s in scores}
-    if not inner or not np.isfinite(level.L):
+    levels = [level for level in base.levels if np.isfinite(level.L)]
+    if not inner or not levels:
         return []
+    at = min(range(len(levels)), key=lambda i: levels[i].L)
+    chosen: dict[frozenset[int], tuple[Score, Score]] = {}
+    for level in {at: levels[at], min(at + 2, len(levels) - 1): levels[min(at + 2, len(levels) - 1)]}.values():
+        for first, second in _pairs_at(problem, base, level, inner)[:most]:
+            chosen.setdefault(frozenset((first.k, second.k)), (first, second))
+    return list(chosen.values())
+
+
+def _pairs_at(
+    problem: Problem, base: Hypothesis, level: Level, inner: Mapping[int, Array]
+) -> list[tuple[Score, Score]]:
+    """All pairs at a level, best first, less the price of their parameters."""
     found = _columns(problem, base, level, list(inner), lambda k: inner[k])
     if found is None:
         return []
@@ -204,13 +218,11 @@ def pairs(problem: Problem, base: Hypothesis, scores: Sequence[Score], most: int
         counted = len(one.counted) + len(other.counted)
         ranked.append((solved[1] - price * counted, first, second, solved[0]))
     ranked.sort(key=lambda entry: -entry[0])
-    return [
-        (
-            _half(problem, found, first, c, 0, level.q),
-            _half(problem, found, second, c, found.b[first].shape[1], level.q),
-        )
-        for _, first, second, c in ranked[:most]
-    ]
+    best = []
+    for _, first, second, c in ranked[:16]:
+        edge = found.b[first].shape[1]
+        best.append((_half(problem, found, first, c, 0, level.q), _half(problem, found, second, c, edge, level.q)))
+    return best
 
 
 def _half(problem: Problem, found: Columns, k: int, c: Array, at: int, q: float) -> Score:
