@@ -17,4 +17,5 @@ EFFECT = Effect(
         )
     },
     family="the force depends on the way the position was reached",
+    law="memory",
 )

@@ -11,4 +11,5 @@ EFFECT = Effect(
     inner={"w": Inner("spread", 0.1, 0.005, 1.0)},
     states={"z": Added("v - (abs(v)*z + v*abs(z))/(2*w)")},
     family="the force depends on the way the position was reached",
+    law="memory",
 )

@@ -11,4 +11,5 @@ EFFECT = Effect(
     sign=1,
     inner={"w": Inner("spread", 0.02, 2e-4, 0.3)},
     family="the resistance hardly depends on speed",
+    law="friction",
 )

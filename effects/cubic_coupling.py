@@ -10,4 +10,5 @@ EFFECT = Effect(
     dimension="1/(state^2 time)",
     family="another state acts",
     generic=True,
+    law="coupling",
 )

@@ -10,4 +10,5 @@ EFFECT = Effect(
     dimension="time/position^2",
     sign=1,
     family="the resistance grows faster than the speed",
+    law="resistance",
 )

@@ -9,4 +9,5 @@ EFFECT = Effect(
     sentence="A spring that hardens (or softens) with displacement, as geometry or material stretches.",
     dimension="1/(position^2 time^2)",
     family="the restoring force grows faster than the displacement",
+    law="restoring",
 )

@@ -10,4 +10,5 @@ EFFECT = Effect(
     dimension="1/(state^2 time)",
     family="the loss grows faster than proportionally",
     generic=True,
+    law="loss",
 )

@@ -10,4 +10,5 @@ EFFECT = Effect(
     dimension="1/time^2",
     inner={"w": Inner("spread", 0.2, 0.01, 0.5, (1.0, 0.4, 1.8))},
     family="the restoring force bends off at an amplitude",
+    law="restoring",
 )

@@ -11,4 +11,5 @@ EFFECT = Effect(
     sign=1,
     inner={"w": Inner("one", 0.05, 0.03, 0.07)},
     family="the loss grows faster than proportionally",
+    law="loss",
 )

@@ -12,4 +12,5 @@ EFFECT = Effect(
     sign=1,
     inner={"w": Inner("range", 0.9, 0.02, 0.98, (1.0, 0.85, 0.65, 0.45, 0.25, 0.1))},
     family="the restoring force bends off at an amplitude",
+    law="restoring",
 )

@@ -10,4 +10,5 @@ EFFECT = Effect(
     dimension="state^0.5/time",
     sign=1,
     family="the loss grows more slowly than proportionally",
+    law="loss",
 )

@@ -11,4 +11,5 @@ EFFECT = Effect(
     sign=1,
     inner={"w": Inner("range", 0.9, 0.02, 0.99, (1.0, 0.85, 0.7, 0.5))},
     family="the loss grows faster than proportionally",
+    law="loss",
 )

@@ -10,4 +10,5 @@ EFFECT = Effect(
     dimension="1/position",
     sign=1,
     family="the resistance grows with speed",
+    law="resistance",
 )

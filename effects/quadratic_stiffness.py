@@ -9,4 +9,5 @@ EFFECT = Effect(
     sentence="An asymmetric spring: stiffer in one direction than in the other.",
     dimension="1/(position time^2)",
     family="the restoring force depends on position",
+    law="restoring",
 )

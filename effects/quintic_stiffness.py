@@ -9,4 +9,5 @@ EFFECT = Effect(
     sentence="A spring that hardens steeply near the end of its travel.",
     dimension="1/(position^4 time^2)",
     family="the restoring force grows faster than the displacement",
+    law="restoring",
 )

@@ -10,4 +10,5 @@ EFFECT = Effect(
     dimension="1e8/(temperature^3 time)",
     sign=1,
     family="the loss grows faster than proportionally",
+    law="loss",
 )

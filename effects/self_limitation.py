@@ -10,4 +10,5 @@ EFFECT = Effect(
     dimension="1/(state time)",
     sign=1,
     family="the loss grows faster than proportionally",
+    law="loss",
 )

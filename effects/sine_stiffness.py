@@ -9,4 +9,5 @@ EFFECT = Effect(
     sentence="Gravity on an arm, or a magnet, pulls back with the sine of the angle.",
     dimension="1/time^2",
     family="the restoring force depends on position",
+    law="restoring",
 )

@@ -12,4 +12,5 @@ EFFECT = Effect(
     sign=1,
     inner={"w": Inner("spread", 0.02, 2e-4, 0.1), "s": Inner("spread", 0.1, 0.01, 0.5)},
     family="the resistance hardly depends on speed",
+    law="friction",
 )

@@ -65,6 +65,8 @@ class Effect:
     them ...". `generic` effects stand in for a shape, not for physics: they are offered where no effect of the same
     shape is. `equation` names a state, output or input of one model in which the effect acts: there are no roles then,
     and the term is in the model's own names, which those of the effect's coefficients, scales and states hide.
+    `law` names what one equation has one of: two bent springs in it are one spring of a shape that the library does
+    not hold. Linear parts have none, for they go with any.
     """
 
     id: str
@@ -80,4 +82,5 @@ class Effect:
     pinned: bool = False
     family: str = ""
     generic: bool = False
+    law: str = ""
     equation: str = ""

@@ -83,6 +83,8 @@ def trial(case: Case, condition: str, noise: float, seed: int, effects: Mapping[
     known = condition != "outside"
     if not known:
         gone = {entry.effect for entry in case.missing}
+        # A shape with a power of its own is any of them.
+        gone |= {name for name, effect in effects.items() if effect.generic and effect.inner}
         gone |= columns.look_alikes(case.deficient, effects, case.missing, record, truth.x)
         effects = {name: effect for name, effect in effects.items() if name not in gone}
     return Trial(model, record, effects, clean, sigma, case.missing, known)

@@ -359,7 +359,8 @@ class Problem:
 
     def noise(self, passed: Pass) -> float:
         """The noise's variance in units of R: given, or the mean squared error."""
-        return self.scale if self.scale is not None else max(float(np.mean(passed.e**2)), self.quietest)
+        with np.errstate(over="ignore"):
+            return self.scale if self.scale is not None else max(float(np.mean(passed.e**2)), self.quietest)
 
     @cached_property
     def quietest(self) -> float:

@@ -19,6 +19,7 @@ SURE = 0.9  # weight from which a verdict names one effect
 REMAINS = 0.15  # of the error beyond the noise: what may remain for an effect to count as found, though not alone
 ODDS = 4.6  # of the criterion: an effect that no alarm calls for must be ten times likelier than none, 2 ln 10
 DECISIVE = 10.0  # of the criterion: what a further effect must gain where the residual does not become white
+PATCH = 0.1  # of its weight: what a patchwork of one law keeps beside a law that is not in the library
 SAME = 0.05  # squared distance of two simulations, in noise units, below which no data could tell them apart
 
 
@@ -59,6 +60,8 @@ def weigh(found: Search) -> Weighing:
     order = np.argsort(values, kind="stable")
     weights = np.exp(-0.5 * (np.array(values) - np.nanmin(values)))
     weights = np.where(np.isfinite(weights), weights, 0.0) / np.nansum(weights)
+    # What stands in for a law that is not in the library leaves most of its weight to that.
+    weights = weights * np.where([patched(found.problem, h) for h in everything], PATCH, 1.0)
     if not settled:
         weights = weights * _told(everything[order[0]])
     groups: list[list[int]] = []
@@ -69,7 +72,16 @@ def weigh(found: Search) -> Weighing:
         else:
             home.append(int(i))
     ranked = [_merged(found, [everything[i] for i in g], [values[i] for i in g], weights[g].tolist()) for g in groups]
-    return Weighing(tuple(sorted(ranked, key=lambda entry: -entry.weight)), settled)
+    return Weighing(tuple(ranked), settled)
+
+
+def patched(problem: Problem, hypothesis: Hypothesis) -> bool:
+    """Whether effects of one law act together in one equation, or a shape stands for no physics at all: they imitate
+    one law that the library does not hold, at the price of one law less than they are.
+    """
+    terms = [problem.terms[k] for k in hypothesis.active]
+    laws = [(term.equation, term.effect.law) for term in terms if term.effect.law]
+    return len(laws) > len(set(laws)) or any(term.effect.generic and term.effect.inner for term in terms)
 
 
 def _hollow(problem: Problem, hypothesis: Hypothesis) -> bool:
@@ -124,6 +136,8 @@ def kind(found: Search, weighing: Weighing) -> Kind:
     if base.gain <= ALARM and found.criterion(base) - found.criterion(best) < ODDS:
         # No alarm, and an effect only just pays for itself: what chance gives to one of many candidates.
         return "adequate"
+    if patched(found.problem, best):
+        return "unexplained" if len(best.active) > 1 else "ambiguous"
     if not weighing.settled:
         before, after = excess(found.problem, base.exact), excess(found.problem, best.exact)
         return "ambiguous" if after < REMAINS * before else "unexplained"
