@@ -240,7 +240,7 @@ def test_two_processes_may_fill_an_empty_cache_at_once(tmp_path: Path) -> None:
     outputs.append(_start(str(tmp_path)).communicate())
     for out, err in outputs:
         assert out == "1.0 2.0\n[]\n", err
-    assert list(tmp_path.glob("model_*.py"))
+    assert list(tmp_path.glob("model_*.o"))
     assert not list(tmp_path.glob("*.tmp"))
 
 
