@@ -101,7 +101,7 @@ def test_add_refuses_what_it_cannot_place(
     new = tmp_path / "new.toml"
     for effect, equation, words in (
         ("constant_forse", "v", "did you mean constant_force"),
-        ("constant_force", "q", "no such state"),
+        ("constant_force", "q", "nothing is called that"),
         ("cubic_stiffness", "p", "no role"),
     ):
         assert words in refused(["add", plant[0], effect, "--equation", equation, "-o", str(new)], capsys)

@@ -87,7 +87,7 @@ def _peaks(problem: Problem, level: Level) -> Array:
     size = np.abs(power)
     padded = np.concatenate([[0.0], size, [0.0]])
     tops = np.flatnonzero((size >= padded[:-2]) & (size >= padded[2:]))
-    return every[tops[np.argsort(-size[tops])][:PEAKS]]
+    return np.asarray(every[tops[np.argsort(-size[tops])][:PEAKS]])
 
 
 def _at_frequency(omega: float, k: int) -> Array:

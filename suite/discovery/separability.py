@@ -10,8 +10,9 @@ import numpy as np
 from suite.discovery import words
 from suite.discovery.engine import Point, Problem
 from suite.discovery.fit import Hypothesis, levenberg_marquardt
-from suite.discovery.identify import ALARM, Search, score
+from suite.discovery.identify import ALARM, Search
 from suite.discovery.result import Verdict
+from suite.discovery.scoring import score
 
 SEPARABLE = 16.0  # delta^2 below which data cannot tell two hypotheses apart
 SHOWN = 6  # rivals whose separation is computed

@@ -24,9 +24,11 @@ def sentence(verdict: Verdict, problem: Problem, settled: bool) -> str:
             return f"The model is adequate{_moved(verdict)}: {white} (p = {p:.2g}) and no effect is missing."
         case "unexplained":
             before, noise = _numbers(verdict.error["before"]), _numbers(verdict.error["noise"])
+            near = " with ".join(named.effect for named in verdict.plausible[0].effects) if verdict.plausible else ""
+            closest = f" The closest is {near}." if near else ""
             return (
                 "The model fails, and nothing in the library explains it: "
-                f"the error stays at {before} against a noise of {noise}."
+                f"the error stays at {before} against a noise of {noise}.{closest}"
             )
         case "missing_effect":
             return f"Missing: {_all(verdict)}, weight {weight(verdict.weight)}; {_falls(verdict)}."
@@ -147,7 +149,7 @@ def _moved(verdict: Verdict) -> str:
 def _family(verdict: Verdict, problem: Problem) -> str:
     """What all plausible effects share, if they do; shapes that stand for nothing in particular have no say."""
     families = {term.effect.id: term.effect.family for term in problem.terms}
-    shared = [{families[named.effect] for named in candidate.effects} - {""} for candidate in verdict.plausible]
-    shared = [family for family in shared if family]
+    shared = [{families[named.effect] for named in candidate.effects} for candidate in verdict.plausible]
+    shared = [family for family in shared if "" not in family]
     common = set.intersection(*shared) if len(shared) > 1 else set()
     return next((re.sub(r"\s+", " ", text) for text in sorted(common) if text), "")
