@@ -104,7 +104,7 @@ def _with_inner(problem: Problem, number: int, k: int) -> Array:
     for name, inner in term.inner.items():
         zero, unit = problem.unit(term, name)
         values.append(zero + inner.start * inner.tries[number % len(inner.tries)] * unit)
-    return np.clip(np.array(values), low[places], high[places])
+    return np.asarray(np.clip(np.array(values), low[places], high[places]))
 
 
 @dataclass(frozen=True, eq=False)
