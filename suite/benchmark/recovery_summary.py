@@ -95,8 +95,13 @@ def wrong(row: Row) -> bool:
 
 
 def unexplained(row: Row) -> bool:
-    """Whether the verdict is that nothing in the library explains it."""
-    return row.get("verdict") == "unexplained"
+    """Whether the verdict holds it likeliest that nothing in the library explains it: it says so, or gives "none of
+    these" more weight than any hypothesis.
+    """
+    weights = list(row.get("plausible_weights") or [])
+    none = 1.0 - sum(weights)
+    likeliest = row.get("verdict") == "ambiguous" and none > max(weights, default=1.0)
+    return row.get("verdict") == "unexplained" or likeliest
 
 
 def white(row: Row) -> bool:

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from suite.discovery.frame import Frame, Index, Layout, Point
 from suite.discovery.noise import QUIETEST, spans
+from suite.discovery.terms import Term
 from suite.kernels.integrate import workspace
 from suite.kernels.prediction import prediction_errors
 from suite.record import Record
@@ -150,6 +151,13 @@ class Problem(Frame):
         low, high = self.limits
         p[layout.columns] = np.clip(theta[runs * free :], low[layout.columns], high[layout.columns])
         return Point(x0, p)
+
+    def with_terms(self, terms: tuple[Term, ...]) -> Problem:
+        """The same record and model beside other candidates; their parameters start at zero."""
+        p = np.concatenate([self.start.p[: len(self.model.parameters)], np.zeros(sum(len(t.names) for t in terms))])
+        x0 = self.start.x0[:, : len(self.model.states)]
+        x0 = np.hstack([x0, np.zeros((len(x0), sum(len(t.states) for t in terms)))])
+        return replace(self, terms=terms, start=Point(x0, p))
 
     def on(self, record: Record, start: Point, **changes: object) -> Problem:
         """The same hypotheses beside another record; nothing is compiled again."""

@@ -22,6 +22,7 @@ from suite.discovery.terms import Term
 
 Array = npt.NDArray[np.float64]
 
+PAIRED = 64  # candidates, by their own scores, whose pairs are looked at
 PEAKS = 10  # frequencies at which a tone is looked for
 FEW = 16  # only every so many-th frequency is looked at where no tone is searched
 COLLINEAR = 1e-3  # a candidate whose column the parameters explain to this is that parameter
@@ -140,7 +141,7 @@ def _columns(
     if not passed.finite:
         return None
     width = passed.J.shape[1] - (len(columns) - len(own_columns))
-    r, B, C = _projected(problem, passed, own_columns, width, prior)
+    r, B, C = projected(problem, passed, own_columns, width, prior)
     b, whole, at = {}, {}, 0
     for k in chosen:
         part = slice(at, at + len(places[k]))
@@ -189,7 +190,7 @@ def pairs(problem: Problem, base: Hypothesis, scores: Sequence[Score], most: int
     """The pairs that would explain most together, whatever each does alone: `most` at the base model's likeliest level,
     where they disturb least, and as many two decades below, where they show most.
     """
-    inner = {s.k: s.p[len(problem.terms[s.k].coefficients) :] for s in scores}
+    inner = {s.k: s.p[len(problem.terms[s.k].coefficients) :] for s in scores[:PAIRED]}
     levels = [level for level in base.levels if np.isfinite(level.L)]
     if not inner or not levels:
         return []
@@ -233,9 +234,7 @@ def _half(problem: Problem, found: Columns, k: int, c: Array, at: int, q: float)
     return Score(k, 0.0, values, q, 0.0)
 
 
-def _projected(
-    problem: Problem, passed: Pass, own: Index, width: int, prior: bool = True
-) -> tuple[Array, Array, Array]:
+def projected(problem: Problem, passed: Pass, own: Index, width: int, prior: bool = True) -> tuple[Array, Array, Array]:
     """The error and the candidates' columns with initial states and parameters projected out (prior rows included).
 
     Returns r (M + priors,), B (M + priors, candidates), and the candidates' columns before, (M, candidates).

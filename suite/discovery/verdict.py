@@ -69,6 +69,8 @@ def judge(found: Search) -> tuple[Verdict, Hypothesis]:
     if spared:
         advice = (*advice, words.idle([problem.terms[k].effect.id for k in spared]))
     advice = (*advice, *determined.findings(problem, named.exact, named.layout))
+    if weighing.law is not None:
+        advice = (*advice, words.law(*weighing.law))
     if problem.colour is not None:
         advice = (*advice, words.colour(names, problem.colour.tolist()))
     if problem.dropped:

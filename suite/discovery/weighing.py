@@ -13,13 +13,18 @@ from suite.discovery.engine import Problem
 from suite.discovery.fit import Hypothesis, Level
 from suite.discovery.identify import ALARM, Search, needs_more
 from suite.discovery.library import triage
+from suite.discovery.outcome import residual
+from suite.discovery.probe import hidden_law
 from suite.discovery.result import Kind
+from suite.discovery.whiteness import ljung_box, whiteness
 
 SURE = 0.9  # weight from which a verdict names one effect
 REMAINS = 0.15  # of the error beyond the noise: what may remain for an effect to count as found, though not alone
 ODDS = 4.6  # of the criterion: an effect that no alarm calls for must be ten times likelier than none, 2 ln 10
 DECISIVE = 10.0  # of the criterion: what a further effect must gain where the residual does not become white
 PATCH = 0.1  # of its weight: what a patchwork of one law keeps beside a law that is not in the library
+WHITE = 1e-3  # Ljung-Box p below which the residual of the best shows a structure
+LESS = 0.4  # the most that all hypotheses hold together where the best leaves a structure
 SAME = 0.05  # squared distance of two simulations, in noise units, below which no data could tell them apart
 
 
@@ -35,10 +40,13 @@ class Weighed:
 
 @dataclass(frozen=True, eq=False)
 class Weighing:
-    """All hypotheses, best first; `settled` says that the best leaves nothing but noise."""
+    """All hypotheses, best first; `settled` says that the best leaves nothing but noise; `law` the equation and the
+    state of a law that is still hidden in it.
+    """
 
     ranked: tuple[Weighed, ...]
     settled: bool
+    law: tuple[str, str] | None = None
 
     @property
     def best(self) -> Weighed:
@@ -53,7 +61,10 @@ class Weighing:
 def weigh(found: Search) -> Weighing:
     """Weights ~ exp(-EBIC/2), twins merged; where something remains, compared with it as process noise."""
     everything = [found.base, *(h for h in found.fitted if not _hollow(found.problem, h))]
-    settled = not needs_more(found, min(everything, key=found.criterion))
+    best = min(everything, key=found.criterion)
+    settled = not needs_more(found, best)
+    law = hidden_law(found.problem, best) if settled else None
+    settled = settled and law is None
     if not settled:
         everything = _thrifty(found, everything)
     values = [found.criterion(h, h.exact if settled else h.best) for h in everything]
@@ -63,7 +74,7 @@ def weigh(found: Search) -> Weighing:
     # What stands in for a law that is not in the library leaves most of its weight to that.
     weights = weights * np.where([patched(found.problem, h) for h in everything], PATCH, 1.0)
     if not settled:
-        weights = weights * _told(everything[order[0]])
+        weights = weights * _told(found.problem, everything[order[0]])
     groups: list[list[int]] = []
     for i in order:
         home = next((g for g in groups if same(found.problem, everything[g[0]], everything[i])), None)
@@ -72,7 +83,7 @@ def weigh(found: Search) -> Weighing:
         else:
             home.append(int(i))
     ranked = [_merged(found, [everything[i] for i in g], [values[i] for i in g], weights[g].tolist()) for g in groups]
-    return Weighing(tuple(ranked), settled)
+    return Weighing(tuple(ranked), settled, law)
 
 
 def patched(problem: Problem, hypothesis: Hypothesis) -> bool:
@@ -167,10 +178,15 @@ def _thrifty(found: Search, everything: Sequence[Hypothesis]) -> list[Hypothesis
     ]  # fmt: skip
 
 
-def _told(best: Hypothesis) -> float:
+def _told(problem: Problem, best: Hypothesis) -> float:
     """The share of the best one's residual variance that is noise. The rest goes to what is not in the library: a
-    hypothesis that leaves a structure cannot be the whole truth, however far ahead of its rivals it is.
+    hypothesis that leaves a structure cannot be the whole truth, however far ahead of its rivals it is; where the
+    residual itself shows one, it is less likely than not.
     """
     if not best.exact.passed.finite:
         return 0.0
-    return min(1.0, 1.0 / max(float(np.mean(best.exact.passed.e**2)), 1e-12))
+    share = min(1.0, 1.0 / max(float(np.mean(best.exact.passed.e**2)), 1e-12))
+    names = list(problem.model.outputs)
+    e = problem.whitened(residual(problem, best.exact))
+    white = ljung_box(whiteness(problem.record, e, names), problem.count // len(names), 0) > WHITE
+    return share if white and hidden_law(problem, best) is None else min(share, LESS)

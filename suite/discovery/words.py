@@ -80,6 +80,11 @@ def value_sd(value: float, sd: float) -> str:
     return f"{value:.{digits}g} +- {sd:.2g}"
 
 
+def law(equation: str, state: str) -> str:
+    """That what remains still follows a state."""
+    return f"What remains in {equation}' still follows {state}: a law that the library does not hold acts there."
+
+
 def idle(effects: Sequence[str]) -> str:
     """That held-out data do not speak for an effect."""
     return (
