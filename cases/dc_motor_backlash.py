@@ -18,11 +18,13 @@ DEFICIENT = Model(
     outputs={"angle": Output("p", column="angle")},
     initial={"p": Initial(0.0), "v": Initial(0.0)},
 )
-# z is dragged along by p where they are more than the play w apart, with a short lag 1/r.
+# z is dragged along by p where they are the play w apart.
+FORTH = "0.5*max(v, 0)*(1 + tanh(20*((p - z)/w - 1)))"
+BACK = "0.5*min(v, 0)*(1 + tanh(20*((z - p)/w - 1)))"
 PLANT = replace(
     DEFICIENT,
-    states={"p": "v", "v": "(K*i - c*v)/J - a*z", "z": "r*(p - z - max(-w, min(w, p - z)))"},
-    parameters={**DEFICIENT.parameters, "a": Parameter(6.0), "w": Parameter(0.15), "r": Parameter(200.0)},
+    states={"p": "v", "v": "(K*i - c*v)/J - a*z", "z": f"{FORTH} + {BACK}"},
+    parameters={**DEFICIENT.parameters, "a": Parameter(6.0), "w": Parameter(0.15)},
 )
 
 CASE = Case(

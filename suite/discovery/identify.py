@@ -18,7 +18,7 @@ from suite.errors import DataError
 
 Array = npt.NDArray[np.float64]
 
-REFITTED = 7  # candidates refitted after the first score
+REFITTED = 12  # candidates refitted after the first score
 BEAM = 3  # hypotheses that a second effect is added to
 NEXT = 5  # second effects refitted for each of them
 CLOSE = 25.0  # rivals within this of the best are converged before weights are formed
