@@ -147,7 +147,6 @@ def test_candidates_keep_the_symmetry_of_free_fall() -> None:
     """Where no equation depends on the height, no candidate does; unless asked."""
     model = Model("fall", {"z": "v", "v": "-g"}, {"g": Parameter(9.81, fixed=True)}, outputs={"z": Output("z", "z")})
 
-
     def texts(absolute: bool) -> list[str]:
         terms = [term for term in candidates(model, EFFECTS, absolute) if term.place == "rate"]
         return [text for term in terms for text in (term.text, *(z[0] for z in term.states.values()))]

@@ -168,8 +168,12 @@ def _grow(found: Search) -> Search:
         fitted = _converged(found, list(known.values()))
         known = {frozenset(hypothesis.active): hypothesis for hypothesis in fitted}
         grown = min(known.values(), key=found.criterion)
-        if found.criterion(grown) >= found.criterion(best) or not needs_more(found, grown):
+        if found.criterion(grown) >= found.criterion(best):
             break
-        if left(grown) > WORTH * left(best):
+        # A force that bends off at a width of its own imitates a polynomial of one term more.
+        bent = any(problem.terms[k].effect.law == "restoring" and problem.terms[k].inner for k in grown.active)
+        if not (needs_more(found, grown) or bent):
+            break
+        if needs_more(found, grown) and left(grown) > WORTH * left(best):
             break
     return replace(found, fitted=tuple(known.values()))

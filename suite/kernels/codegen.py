@@ -26,6 +26,7 @@ from suite.kernels.slopes import Slopes
 Array = npt.NDArray[np.float64]
 Expr: TypeAlias = sympy.Expr
 
+
 @dataclass(frozen=True)
 class Gate:
     """A term that can be switched on: what it adds to rates and outputs (by index), and the states that it brings
