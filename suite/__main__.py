@@ -41,8 +41,12 @@ def parser() -> argparse.ArgumentParser:
     verb.add_argument("folder", type=Path, metavar="DIR", help="folder to write model.toml and data*.csv to")
     verb.add_argument("--noise", type=float, default=0.05, help="simulated: sensor noise, default 0.05 of each spread")
     verb.add_argument("--seed", type=int, default=1, help="simulated: seed of the noise, default 1")
-    verb.add_argument("--source", type=Path, metavar="DIR", help="folder of measured data that are not shipped")
-    verbs.add_parser("list", parents=[as_json], help="every plug-in by kind; those not loaded, and why")
+    # --source is its former name.
+    verb.add_argument(
+        "--data", "--source", type=Path, metavar="DIR", help="folder of measured data that are not shipped"
+    )
+    verb = verbs.add_parser("list", parents=[as_json], help="every plug-in by kind; those not loaded, and why")
+    verb.add_argument("--effects", type=Path, metavar="DIR", help="write the effects as a page with pictures instead")
     verb = verbs.add_parser(
         "check", parents=[inputs, as_json], help="what is in the data, and what would spoil an analysis"
     )
@@ -77,9 +81,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         if args.verb == "bench":
             return bench_verbs.run(args)
+        if args.verb == "list":
+            from suite import listing
+
+            return listing.run(args)
         from suite import verbs
 
-        return int(getattr(verbs, args.verb.replace("list", "list_plugins"))(args))
+        return int(getattr(verbs, args.verb)(args))
     except InputError as error:
         print(f"unmodelled: {error}", file=sys.stderr)
         return BAD_INPUT

@@ -33,7 +33,7 @@ from suite.record import Record
 from suite.tables import write_csv
 
 ALIASES = {"paper": "paper-cubic", "mug": "cooling-mug", "whiffle": "whiffle-ball"}
-KNOWN_TO = 0.05  # of its value: how well the parameters of a simulated example are known
+KNOWN_TO = 0.05  # of its value: how well a parameter of a simulated example is known, where its case is silent
 
 
 def example(args: argparse.Namespace) -> int:
@@ -50,11 +50,10 @@ def example(args: argparse.Namespace) -> int:
         if args.seed < 0:
             raise InputError(f"--seed: expected a whole number from 0, got {args.seed}; write --seed 1")
         record = case.simulate(args.noise, args.seed)[0]
-        known = {n: replace(p, sd=KNOWN_TO * abs(p.value)) if not p.fixed else p for n, p in model.parameters.items()}
-        model = replace(model, parameters=known)
+        model = replace(model, parameters={n: _known(p) for n, p in model.parameters.items()})
     else:
         assert case.measured is not None
-        record = case.measured(args.source)
+        record = case.measured(args.data)
     writable_folder(args.folder)
     written = [args.folder / "model.toml"]
     write_model(replace(model, time=model.time or "t"), written[0])
@@ -74,30 +73,10 @@ def example(args: argparse.Namespace) -> int:
     return 0
 
 
-def list_plugins(args: argparse.Namespace) -> int:
-    """Print every plug-in by kind, and those that could not be loaded."""
-    found = {kind: plugins.find(kind) for kind in plugins.KINDS}
-    if args.json:
-        return _json(
-            {
-                kind: {"loaded": {n: _says(item) for n, item in f.loaded.items()}, "failed": f.failed}
-                for kind, f in found.items()
-            }
-        )
-    for kind, entry in found.items():
-        print(f"{kind} ({len(entry.loaded)})")
-        width = max(map(len, entry.loaded), default=0)
-        for name, item in entry.loaded.items():
-            print(f"  {name:<{width}}  {_says(item)}")
-        for label, reason in entry.failed.items():
-            print(f"  not loaded: {label}: {reason}")
-    return 0
-
-
-def _says(item: Any) -> str:
-    """A plug-in's own sentence."""
-    text = getattr(item, "sentence", None) or (type(item).__doc__ or "").strip()
-    return str(text).split("\n")[0]
+def _known(parameter: Parameter) -> Parameter:
+    """A parameter of an example with how well it is known, where the case does not say it."""
+    said = parameter.fixed or parameter.free or parameter.sd is not None or parameter.value == 0
+    return parameter if said else replace(parameter, sd=KNOWN_TO * abs(parameter.value))
 
 
 def check(args: argparse.Namespace) -> int:
