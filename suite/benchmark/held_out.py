@@ -174,7 +174,8 @@ def text(rows: Iterable[Mapping[str, Any]]) -> str:
     def number(value: float | None) -> str:
         return "" if value is None else f"{value:.3g}"
 
-    cells, reasons = [list(HEADINGS)], []
+    cells: list[list[Any]] = [list(HEADINGS)]
+    reasons: list[str] = []
     for row in rows:
         if "reason" in row:
             reasons.append(f"{row['case']}: {row['reason']}")

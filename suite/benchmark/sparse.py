@@ -89,7 +89,7 @@ def _pointwise(trial: Trial, solve: Solver) -> Answer:
 
     model, record, x = _states(trial)
     library_columns = columns.named(model, trial.effects, record, x)
-    slopes = np.asarray(pysindy.SmoothedFiniteDifference()(x, record.t))
+    slopes = np.asarray(pysindy.SmoothedFiniteDifference()(x, record.t))  # pyright: ignore[reportArgumentType]
     rates = np.array([model.rate(t, state, u) for t, state, u in zip(record.t, x, record.u, strict=True)])
     found: list[tuple[float, Name]] = []
     for i, equation in enumerate(model.states):

@@ -66,7 +66,7 @@ def _shape(term: Term, names: Names) -> sympy.Expr:
     shape = expressions.parse(term.text, names.all | own, f"effect {term.effect.id}")
     numbered = {expressions.symbol(name): sympy.Symbol(f"c{i}") for i, name in enumerate(term.names)}
     brought = {expressions.symbol(z): sympy.Symbol(f"{term.effect.id}_{z}") for z in term.states}
-    return shape.subs(numbered | brought)
+    return shape.subs(list((numbered | brought).items()))
 
 
 def _positive(shape: sympy.Expr) -> bool:

@@ -107,7 +107,7 @@ def _stretch(out: Flags, record: Record) -> tuple[Flags, str]:
     part[at[0] : at[-1] + 1] = True
     if len(record.starts) > 1 or part.mean() > 0.8:
         return part, ""
-    before, after = f"before t = {_number(record.t[at[-1]])}", f"after t = {_number(record.t[at[0]])}"
+    before, after = f"before t = {_number(float(record.t[at[-1]]))}", f"after t = {_number(float(record.t[at[0]]))}"
     edge = 0.1 * len(out)
     if at[0] < edge:
         return part, before
