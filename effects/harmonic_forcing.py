@@ -9,6 +9,6 @@ EFFECT = Effect(
     sentence="A machine nearby, an imbalance or the mains shakes the plant at one frequency.",
     dimension="rate",
     coefficients=("a", "b"),
-    inner={"w": Inner("frequency", 1.0, 0.5, 1e9)},
+    inner={"w": Inner("frequency", 3.0, 2.5, 1e9)},
     family="a force repeats at one frequency",
 )

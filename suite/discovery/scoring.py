@@ -23,6 +23,7 @@ from suite.discovery.terms import Term
 Array = npt.NDArray[np.float64]
 
 PAIRED = 64  # candidates, by their own scores, whose pairs are looked at
+PERIODS = 3  # in a record, before something that repeats can be called a tone
 PEAKS = 10  # frequencies at which a tone is looked for
 FEW = 16  # only every so many-th frequency is looked at where no tone is searched
 COLLINEAR = 1e-3  # a candidate whose column the parameters explain to this is that parameter
@@ -280,4 +281,4 @@ def frequencies(problem: Problem) -> Array:
     step = float(np.median(problem.record.runs[0].dt))
     lowest = 2.0 * np.pi / problem.length
     count = int(min(0.5 * np.pi / step / lowest, 200))
-    return np.asarray(lowest * np.arange(1.0, max(count, 1) + 1.0))
+    return np.asarray(lowest * np.arange(PERIODS, max(count, PERIODS) + 1.0))
