@@ -1,0 +1,54 @@
+"""Records that are long, plants that forget where they started, and effects that only help together."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from suite import plugins
+from suite.case import Case
+from suite.discovery.verdict import diagnose, investigate, judge
+
+EFFECTS = plugins.effects()
+
+
+def lasting(name: str, duration: float) -> Case:
+    """A case run for longer."""
+    case = plugins.cases()[name]
+    assert case.experiment is not None
+    return replace(case, experiment=replace(case.experiment, duration=duration))
+
+
+def test_a_long_record_of_a_hardening_spring_is_diagnosed() -> None:
+    """20,000 samples at 5 % noise: cubic_stiffness is named, its coefficient within 3 sd, and that is below 1 %."""
+    case = lasting("duffing", 2000.0)
+    record, truth = case.simulate(0.05, 1)
+    assert len(record) > 20_000
+    verdict = diagnose(case.deficient, record, EFFECTS)
+    assert [(e.effect, e.equation) for e in verdict.effects] == [("cubic_stiffness", "v")]
+    a = verdict.effects[0].coefficients["a"]
+    assert abs(a.value - 0.3) < 3.0 * a.sd < 0.03 * 0.3
+    assert 0.98 < verdict.error["after"]["pos"] / truth.noise[0] < 1.02
+
+
+def test_a_complete_chaotic_model_is_adequate_in_stretches() -> None:
+    """Lorenz-63 over 15 s forgets its start: the record is cut into stretches, and nothing is missing."""
+    case = lasting("null-lorenz", 15.0)
+    found = investigate(case.deficient, case.simulate(0.01, 1)[0], EFFECTS)
+    verdict, _ = judge(found)
+    starts = found.problem.record.starts
+    assert len(starts) > 2
+    assert (verdict.verdict, verdict.effects) == ("adequate", ())
+    for name, true in case.deficient.parameters.items():
+        entry = verdict.parameters[name]
+        assert abs(entry["value"] - true.value) < 4.0 * entry["sd"] < 0.02 * true.value
+
+
+def test_two_effects_that_look_like_a_third_are_found() -> None:
+    """Dry friction and drag, which viscous damping imitates better than either alone: both are named."""
+    case = plugins.cases()["pendulum-friction-and-drag"]
+    verdict = diagnose(case.deficient, case.simulate(0.01, 1)[0], EFFECTS)
+    found = {(named.effect, named.equation): next(iter(named.coefficients.values())) for named in verdict.effects}
+    true = {("coulomb_friction", "w"): 0.12, ("quadratic_drag", "w"): 0.06}
+    assert set(found) == set(true)
+    for name, value in true.items():
+        assert abs(found[name].value - value) < 3.0 * found[name].sd
