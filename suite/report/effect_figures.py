@@ -80,7 +80,7 @@ def _elsewhere(effect: Effect, found: Trace, before: Array, after: Array, title:
 
 def formula(effect: Effect, found: Trace) -> str:
     """The term as text, with the inner scales at which it is drawn; the rates of its states stand in the page."""
-    scales = "".join(f", {name} = {value:.2g}" for name, value in found.scales.items())
+    scales = "".join(f", {name}={value:.2g}" for name, value in found.scales.items())
     letter = next((letter for letter, role in effect.roles.items() if role == found.place), "")
     sign, rest = effect.term[0], effect.term[1:]
     match found.place:
@@ -140,8 +140,9 @@ def _kept(found: Trace) -> Index:
     """Samples to draw: evenly spread, with both sides of a jump of the input."""
     kept = np.linspace(0, len(found.t) - 1, POINTS).astype(int)
     if found.before is not None:
-        jumps = np.flatnonzero(np.abs(np.diff(found.before)) > 0.1)
-        kept = np.concatenate([kept, jumps, jumps + 1])
+        for curve in (found.before, found.after):
+            jumps = np.flatnonzero(np.abs(np.diff(curve)) > 0.1) if curve is not None else kept[:0]
+            kept = np.concatenate([kept, jumps, jumps + 1])
     return np.unique(kept)
 
 

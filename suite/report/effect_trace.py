@@ -143,7 +143,9 @@ class Motion:
             case "held":
                 return self.held
             case "late":
-                return np.asarray(np.interp(self.t - 1.0, self.t, self.input))
+                # Held between samples, so that a step stays one.
+                at = np.searchsorted(self.t, self.t - 1.0, side="right") - 1
+                return np.asarray(self.input[np.maximum(at, 0)])
             case "parameter" | "fixed":
                 return one
         return self.slow if self.coupled else self.state
