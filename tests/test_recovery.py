@@ -239,7 +239,7 @@ def test_plans_of_recovery_choose_conditions_that_a_case_has() -> None:
     assert {"missing", "null-right", "null-wrong", "outside"} == {cell.variant for cell in cells}
     assert all(cases[cell.case].truth is not None for cell in cells)
     assert all(len(cases[cell.case].deficient.states) <= 12 for cell in cells)
-    assert {cell.variant for cell in cells if cell.estimator == "pysindy"} == {"missing", "null-right"}
+    assert {cell.variant for cell in cells if cell.estimator == "pysindy"} == {"missing"}
     assert all(cases[cell.case].missing for cell in cells if cell.variant == "missing")
     with pytest.raises(InputError, match="expected some of missing"):
         plan.parse({"kind": "recovery", "variants": ["tuned"]}, "p", "p.toml")

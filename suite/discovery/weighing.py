@@ -64,9 +64,10 @@ def weigh(found: Search) -> Weighing:
     best = min(everything, key=found.criterion)
     settled = not needs_more(found, best)
     law = hidden_law(found.problem, best) if settled else None
-    settled = settled and law is None
+    # A patchwork may fit; what it stands for is still not in the library.
+    settled = settled and law is None and not (len(best.active) > 1 and patched(found.problem, best))
     if not settled:
-        everything = _thrifty(found, everything)
+        everything = _thrifty(found, [h for h in everything if not patched(found.problem, h)])
     values = [found.criterion(h, h.exact if settled else h.best) for h in everything]
     order = np.argsort(values, kind="stable")
     weights = np.exp(-0.5 * (np.array(values) - np.nanmin(values)))
