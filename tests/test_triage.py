@@ -20,11 +20,12 @@ MODEL = NULL.deficient
 NOISE = 0.01
 
 
-def plain(truth: Model = MODEL, seed: int = 1) -> Record:
+def plain(truth: Model = MODEL, seed: int = 1, model: Model = MODEL) -> Record:
     """The driven oscillator measured, or another plant with the same sensor and input."""
     assert NULL.experiment is not None
     start = (0.0,) * len(truth.states)
-    return replace(NULL, truth=truth, experiment=replace(NULL.experiment, x0=start)).simulate(NOISE, seed)[0]
+    case = replace(NULL, deficient=model, truth=truth, experiment=replace(NULL.experiment, x0=start))
+    return case.simulate(NOISE, seed)[0]
 
 
 def late() -> tuple[Model, Record]:
@@ -93,7 +94,19 @@ def test_a_fault_outside_the_equations_of_motion_is_named_or_plausible(fault: st
     named = {named.effect for named in verdict.effects}
     plausible = {candidate.effects[0].effect for candidate in verdict.plausible if len(candidate.effects) == 1}
     assert right & (named | plausible)
-    assert verdict.weight <= 0.9 or named <= right
+    assert verdict.verdict == "ambiguous" or named <= right
+
+
+def test_a_gain_is_told_from_a_scale_where_a_known_force_acts_beside_the_input() -> None:
+    """Under a known weight a sensor's scale changes the sag too, a mass the frequency: the input's gain is named."""
+    exact = {name: replace(parameter, fixed=True) for name, parameter in MODEL.parameters.items()}
+    weighed = replace(MODEL, parameters=exact).plus("v", "-0.5")
+    record = plain(weighed.plus("F", "+a*F", {"a": Parameter(0.2)}), model=weighed)
+    verdict = diagnose(weighed, record, EFFECTS)
+    assert [(e.effect, e.equation) for e in verdict.effects] == [("missing_input_gain", "F")]
+    assert (verdict.verdict, len(verdict.plausible)) == ("missing_effect", 1)
+    a = verdict.effects[0].coefficients["a"]
+    assert abs(a.value - 0.2) < 4.0 * a.sd
 
 
 @pytest.mark.parametrize("seed", [1, 2])
