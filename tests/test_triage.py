@@ -109,6 +109,20 @@ def test_a_gain_is_told_from_a_scale_where_a_known_force_acts_beside_the_input()
     assert abs(a.value - 0.2) < 4.0 * a.sd
 
 
+BACKWARD = pytest.mark.xfail(strict=True, reason="a clock may run backward, with a negative damping: it fits as well")
+
+
+@pytest.mark.parametrize("factor", [0.001, 0.5, pytest.param(10.0, marks=BACKWARD)])
+def test_time_in_another_unit_is_a_clock_that_runs_forward(factor: float) -> None:
+    """The time column in other units than the model's: the rates times 1 / factor, the damping as it was."""
+    record = plain()
+    library = {name: EFFECTS[name] for name in ("clock_rate", "cubic_stiffness", "sensor_bias")}
+    verdict = diagnose(MODEL, replace(record, t=factor * record.t), library)
+    assert [named.effect for named in verdict.effects] == ["clock_rate"]
+    assert 1.0 + verdict.effects[0].coefficients["a"].value == pytest.approx(1.0 / factor, rel=0.01)
+    assert verdict.parameters["c"]["value"] == pytest.approx(0.3, rel=0.05)
+
+
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_sound_measurement_of_a_complete_model_shows_no_fault(seed: int) -> None:
     """Nothing wrong with sensor, input, numbers and clock: the model is adequate."""
