@@ -8,5 +8,6 @@ EFFECT = Effect(
     roles={"f": "clock"},
     sentence="The time column runs too fast or too slow: a wrong sampling time, another unit of time.",
     dimension="1",
+    least=-0.999,
     family="the measurement is at fault",
 )

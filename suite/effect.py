@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
@@ -18,7 +19,8 @@ class Inner:
 
     `of` is "spread" (the visited range of the term's variable, from zero), "range" (a place in it: 0 is its low end,
     1 its high end), "frequency" (2 pi over the record's length), "time" (the record's length), "step" (one sample) or
-    "one" (a pure number). `tries` are the multiples of the start that are scored.
+    "one" (a pure number). `tries` are the multiples of the start that are scored. Where low is high it is a reference
+    that never moves, and is not counted.
     """
 
     of: Literal["spread", "range", "frequency", "time", "step", "one"]
@@ -26,6 +28,11 @@ class Inner:
     low: float
     high: float
     tries: tuple[float, ...] = (1.0, 0.3, 3.0)
+
+    @property
+    def moves(self) -> bool:
+        """Whether a fit may change it."""
+        return self.high > self.low
 
 
 @dataclass(frozen=True)
@@ -59,14 +66,15 @@ class Effect:
     - in a parameter: "parameter" becomes parameter + term wherever it stands; "fixed" is one that is said to be exact;
     - in the clock: "clock" stands for every rate, times which the term is added.
 
-    `sign` is 1 for a coefficient that cannot be negative (a loss), 0 for either sign. `pinned`: the coefficient is
-    exactly 1 where the effect is there; it is scored as if free and not counted. `dimension` is the coefficient's, in
-    words of the roles. `family` is what this term shares with its look-alikes, as a clause that completes "in each of
-    them ...". `generic` effects stand in for a shape, not for physics: they are offered where no effect of the same
-    shape is. `equation` names a state, output or input of one model in which the effect acts: there are no roles then,
-    and the term is in the model's own names, which those of the effect's coefficients, scales and states hide.
-    `law` names what one equation has one of: two bent springs in it are one spring of a shape that the library does
-    not hold. Linear parts have none, for they go with any.
+    `sign` is 1 for a coefficient that cannot be negative (a loss), 0 for either sign; `least` is another lower bound
+    (a clock does not run backward). `pinned`: the coefficient is exactly 1 where the effect is there; it is scored as
+    if free and not counted. `dimension` is the coefficient's, in words of the roles. `family` is what this term
+    shares with its look-alikes, as a clause that completes "in each of them ...". `generic` effects stand in for a
+    shape, not for physics: they are offered where no effect of the same shape is. `equation` names a state, output or
+    input of one model in which the effect acts: there are no roles then, and the term is in the model's own names,
+    which those of the effect's coefficients, scales and states hide. `law` names what one equation has one of: two
+    bent springs in it are one spring of a shape that the library does not hold. Linear parts have none, for they go
+    with any.
     """
 
     id: str
@@ -83,4 +91,10 @@ class Effect:
     family: str = ""
     generic: bool = False
     law: str = ""
+    least: float = -math.inf
     equation: str = ""
+
+    @property
+    def lowest(self) -> float:
+        """The lower bound of the coefficients."""
+        return max(0.0, self.least) if self.sign else self.least

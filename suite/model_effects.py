@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import keyword
+import math
 import re
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any, get_args
@@ -15,7 +16,7 @@ from suite.names import NAME
 
 KEYS = (
     "id", "term", "roles", "equation", "sentence", "coefficients", "sign", "inner", "states", "forms", "pinned",
-    "dimension", "family", "generic",
+    "dimension", "family", "generic", "law", "least",
 )  # fmt: skip
 ROLES = get_args(Role)
 OUTSIDE = ("output", "input", "late", "held", "parameter", "fixed", "clock")  # roles of what is no rate
@@ -103,6 +104,10 @@ class _Table:
             family=self.words("family"),
             generic=document.flag(self.place, table, "generic"),
             equation=equation,
+            law=self.words("law"),
+            least=document.number(f"{self.place} least", table["least"], "least = -1.0")
+            if "least" in table
+            else -math.inf,
         )
 
     def vanishes(self, term: str, coefficients: Sequence[str], known: Collection[str]) -> None:
@@ -153,11 +158,11 @@ class _Table:
         if entry["of"] not in SCALES:
             raise self.refuse(f"inner {name}", f"of is {said(entry['of'])}", f"choose one of {', '.join(SCALES)}")
         start, low, high = (document.number(place, entry[key], f"{key} = 0.1") for key in ("start", "low", "high"))
-        if not low <= start <= high or low == high:
+        if not low <= start <= high:
             raise self.refuse(
                 f"inner {name}",
                 f"start {start:g} with low {low:g} and high {high:g}",
-                "order them: low <= start <= high, low < high",
+                "order them: low <= start <= high",
             )
         if low <= 0 and entry["of"] not in ("range", "one"):
             raise self.refuse(f"inner {name}", f"low is {low:g}", "a scale is positive: write low = 0.01")

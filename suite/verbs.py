@@ -196,13 +196,13 @@ def _numbers(model: Model, term: Term, record: Record | None) -> Mapping[str, Pa
     free = {name: Parameter(0.0, free=True) for name in term.coefficients}
     free |= {z: Parameter(0.0) for z in term.states}
     if record is None:
-        scales = {n: Parameter(i.start, free=True, bounds=(i.low, i.high)) for n, i in term.inner.items()}
+        scales = {n: term.parameter(n, i.start, i.low, i.high) for n, i in term.inner.items()}
         return free | scales
     problem = prepare(model, record, (term,))
     low, high = problem.limits
     free |= {z: Parameter(float(problem.start.x0[0, j])) for z, j in zip(term.states, problem.states(0), strict=True)}
     for name, j in zip(term.names, problem.places(0), strict=True):
-        free[name] = Parameter(float(problem.start.p[j]), free=True, bounds=(float(low[j]), float(high[j])))
+        free[name] = term.parameter(name, float(problem.start.p[j]), float(low[j]), float(high[j]))
     return free
 
 

@@ -74,7 +74,6 @@ def test_twins_are_stated_together() -> None:
     assert verdict.effects[0].effect == "constant_force"
 
 
-@pytest.mark.xfail(strict=True, reason="look-alikes share the weight of their group evenly, whatever is known beside")
 def test_what_the_file_knows_of_parameters_tells_twins_apart() -> None:
     """An input's gain 20 % off gives the output of a mass, damping and spring 17 % off, which the file says are known
     to 5 %: of the two the gain is a thousand times likelier, and is named.
@@ -87,7 +86,6 @@ def test_what_the_file_knows_of_parameters_tells_twins_apart() -> None:
     assert weights.get("wrong_value", 0.0) < 0.01 < 0.9 < weights["missing_input_gain"]
 
 
-@pytest.mark.xfail(strict=True, reason="where samples are far apart no process noise helps, and all counts as settled")
 def test_what_leaves_most_of_the_error_is_never_certain() -> None:
     """Sampled every sixteen periods (a time column in milliseconds), an effect that leaves 36 sigma is no find."""
     record, truth = NULL.simulate(0.02, 1)

@@ -76,15 +76,13 @@ class Problem(Frame):
         """Errors (N, outputs) or their Jacobian (N, outputs, theta) less what the noise remembers, in its own units."""
         if self.colour is None:
             return e
-        shape = (-1,) + (1,) * (e.ndim - 2)
-        rho, left = self.colour.reshape(shape), np.sqrt(1.0 - self.colour**2).reshape(shape)
-        before = np.zeros_like(e)
-        before[1:] = np.where(self.seen[:-1].reshape(len(e) - 1, *self.seen.shape[1:], *shape[1:]), e[:-1], 0.0)
+        deep = (..., *(None,) * (e.ndim - 2))
         known = np.zeros(self.seen.shape, dtype=bool)
         known[1:] = self.seen[:-1]
         known[list(self.record.starts)] = False
-        known = known.reshape(*self.seen.shape, *shape[1:])
-        return np.where(known, (e - rho * before) / left, e)
+        before = np.where(known[deep], np.roll(e, 1, axis=0), 0.0)
+        left = np.sqrt(1.0 - self.colour**2)
+        return np.where(known[deep], (e - self.colour[deep] * before) / left[deep], e)
 
     def coloured(self, rho: Array) -> Problem:
         """The same problem with sensors whose noise remembers."""
@@ -119,11 +117,11 @@ class Problem(Frame):
             return np.inf
         mean, sd = self.prior
         columns = layout.columns
-        with np.errstate(invalid="ignore"):
+        with np.errstate(invalid="ignore", over="ignore"):
             pulls = ((point.p - mean) / sd)[columns]
-        pull = float((pulls[np.isfinite(sd[columns])] ** 2).sum())
-        if self.scale is not None:
-            return float((passed.e**2).sum()) / self.scale + passed.logs + pull
+            pull = float((pulls[np.isfinite(sd[columns])] ** 2).sum())
+            if self.scale is not None:
+                return float((passed.e**2).sum()) / self.scale + passed.logs + pull
         return float(len(passed.e) * np.log(self.noise(passed)) + passed.logs + pull)
 
     def noise(self, passed: Pass) -> float:

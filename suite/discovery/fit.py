@@ -192,7 +192,10 @@ def prepare(model: Model, record: Record, terms: tuple[Term, ...] = ()) -> Probl
     record, dropped = without_outliers(model, record)
     R = noise_variance(model, record)
     x0, free = first_states(model, record)
-    problem = Problem(model, record, (), R, Point(x0, model.values), free, np.zeros(len(model.states)), dropped=dropped)
+    problem = Problem(
+        model, record, (), R, Point(x0, model.values), free, np.zeros(len(model.states)), dropped=dropped,
+        rough=noise_variance(model, record, stated=False),
+    )  # fmt: skip
     # The path decides the weights, the weights the path: two rounds settle it.
     path = rough_path(problem)
     for _ in range(2):

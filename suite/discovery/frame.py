@@ -61,6 +61,7 @@ class Frame:
     frozen: bool = False  # fits move initial states only
     scale: float | None = None  # the noise's variance in units of R, where it is known and not profiled
     dropped: int = 0  # samples left out as outliers
+    rough: Array = field(default_factory=lambda: np.zeros(0))  # (outputs,) the variance that the record itself shows
     colour: Array | None = None  # memory of each output's noise from sample to sample, (outputs,); None: white
 
     @cached_property
@@ -160,7 +161,7 @@ class Frame:
         low = [p.bounds[0] for p in self.model.parameters.values()]
         high = [p.bounds[1] for p in self.model.parameters.values()]
         for term in self.terms:
-            low += [0.0 if term.effect.sign else -np.inf] * len(term.coefficients)
+            low += [term.effect.lowest] * len(term.coefficients)
             high += [np.inf] * len(term.coefficients)
             for name, inner in term.inner.items():
                 zero, unit = self.unit(term, name)
@@ -231,8 +232,8 @@ class Frame:
         sds = self.prior[1]
         chosen = [j for j in range(len(self.model.parameters)) if sds[j] > 0]
         for k in active:
-            skipped = len(self.terms[k].coefficients) if self.terms[k].effect.pinned else 0
-            chosen += self.places(k)[skipped:]
+            term = self.terms[k]
+            chosen += [j for name, j in zip(term.names, self.places(k), strict=True) if name in term.counted]
         return np.array(chosen, dtype=np.int64)
 
     def layout(self, active: Sequence[int], also: Sequence[int] = (), columns: Index | None = None) -> Layout:

@@ -23,6 +23,7 @@ BEAM = 3  # hypotheses that a second effect is added to
 NEXT = 5  # second effects refitted for each of them
 CLOSE = 25.0  # rivals within this of the best are converged before weights are formed
 ALARM = 9.0  # Lambda above which the model fails
+LOUD = 25.0  # of the noise's variance: an error from which the model fails whatever a process noise is worth
 WORTH = 0.7  # of the error's variance: what a further effect must leave less than, for yet another to be sought
 PAIRS = 4  # pairs that are refitted because they help together, at each of two levels
 
@@ -82,13 +83,26 @@ def search(problem: Problem) -> Search:
 
 
 def needs_more(found: Search, best: Hypothesis) -> bool:
-    """Whether something remains after the best hypothesis: a process noise is still worth having."""
+    """Whether something remains after the best hypothesis: a process noise is still worth having, or the error is far
+    above any noise.
+    """
     if not np.isfinite(best.exact.L) or best.gain > ALARM:
         return True
-    # Where no equation may be wrong there is no process noise to be worth having: the error itself tells.
     problem, e = found.problem, best.exact.passed.e
+    # Where samples are far apart no process noise can follow them; that none helps says nothing then. A noise that
+    # remembers is larger than neighbouring samples show.
+    if problem.colour is None and _loudest(problem, best) > LOUD:
+        return True
+    # Where no equation may be wrong there is no process noise to be worth having: the error itself tells.
     excess = float((e**2).sum()) - len(e)
     return not problem.weights.any() and excess > ALARM * np.sqrt(2.0 * len(e))
+
+
+def _loudest(problem: Problem, best: Hypothesis) -> float:
+    """The largest mean squared error of an output, over the larger of the variances that file and record give it."""
+    square = np.full(problem.seen.shape, np.nan)
+    square[problem.seen] = best.exact.passed.e**2
+    return float(np.nanmax(np.nanmean(square, axis=0) * problem.R / np.maximum(problem.R, problem.rough)))
 
 
 def refit(problem: Problem, parent: Hypothesis, active: tuple[int, ...], starts: Sequence[Score]) -> Hypothesis:

@@ -18,6 +18,7 @@ from suite.discovery import roles
 from suite.discovery.terms import Place, Term
 from suite.effect import Effect
 from suite.model import Model
+from suite.names import NAME
 from suite.record import Record
 
 FEW_STATES = 4  # up to which any three states are tried together
@@ -168,7 +169,7 @@ def _elsewhere(model: Model, effect: Effect, names: Names) -> Iterator[Term]:
     forms = (effect.term, *effect.forms)
     if role == "output":
         for name, output in model.outputs.items():
-            letters = {letter: f"({output.equation})"}
+            letters = {letter: output.equation if NAME.match(output.equation) else f"({output.equation})"}
             for form in forms if not (output.angle and letter in _words(effect.term)) else ():
                 yield _bound(effect, form, "output", name, name, letters, name, names)
     elif role == "input":

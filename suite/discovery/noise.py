@@ -17,8 +17,8 @@ MOST = 0.05  # of an output's samples: where more than that stand out, they are 
 QUIETEST = 1e-7  # of an output's range: below it the integrator, not the sensor, makes the error
 
 
-def noise_variance(model: Model, record: Record) -> Array:
-    """Variance of one sample of each output, (outputs,): the file's sigma, else from fourth differences.
+def noise_variance(model: Model, record: Record, stated: bool = True) -> Array:
+    """Variance of one sample of each output, (outputs,): the file's sigma (if `stated`), else from fourth differences.
 
     On even sampling var(4th difference)/70 is the variance of white noise under any cubic; on uneven sampling the
     fourth divided difference, scaled to the same expectation. Squares are clipped at nine times their robust scale, so
@@ -28,7 +28,7 @@ def noise_variance(model: Model, record: Record) -> Array:
     for j, output in enumerate(model.outputs.values()):
         span = float(spans(record)[j])
         floor = (QUIETEST * (span or 1.0)) ** 2
-        if output.sigma is not None:
+        if stated and output.sigma is not None:
             variances.append(max(output.sigma**2, floor))
             continue
         squares = np.concatenate([_innovation(run.t, unrolled(run, j, output.angle)) for run in record.runs])

@@ -43,9 +43,13 @@ def describe(problem: Problem, hypothesis: Hypothesis) -> list[Named]:
         term = problem.terms[k]
         unit = brought(term, problem.model)
         coefficients = {
-            name: Coefficient(float(exact.point.p[j]), float(np.sqrt(max(V[place[j], place[j]], 0.0))), unit[name])
+            name: Coefficient(
+                float(exact.point.p[j]),
+                float(np.sqrt(max(V[place[j], place[j]], 0.0))) if j in place else 0.0,
+                unit[name],
+            )
             for name, j in zip(term.names, problem.places(k), strict=True)
-            if name in term.counted
+            if name in term.stated
         }
         named.append(Named(term.effect.id, term.equation, term.shown, coefficients))
     return named
@@ -70,7 +74,7 @@ def amended(problem: Problem, hypothesis: Hypothesis, fitted: bool = True) -> Mo
     model = summarise(problem, hypothesis).model if fitted else problem.model
     terms = [problem.terms[k] for k in hypothesis.active]
     numbers = [
-        {name: Parameter(float(point.p[j]), free=True, bounds=(float(low[j]), float(high[j])))
+        {name: term.parameter(name, float(point.p[j]), float(low[j]), float(high[j]))
          for name, j in zip(term.names, problem.places(k), strict=True)}
         | {name: Parameter(float(point.x0[0, j])) for name, j in zip(term.states, problem.states(k), strict=True)}
         for k, term in zip(hypothesis.active, terms, strict=True)

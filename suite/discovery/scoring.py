@@ -182,8 +182,7 @@ def _solved(problem: Problem, found: Columns, members: Sequence[int]) -> tuple[A
         return None
     scale = np.sqrt(norms)
     c = -np.linalg.lstsq(gram / np.outer(scale, scale), b.T @ found.r / scale, rcond=1e-10)[0] / scale
-    lossy = np.concatenate([[bool(problem.terms[k].effect.sign)] * found.b[k].shape[1] for k in members])
-    c = np.where(lossy, np.maximum(c, 0.0), c)
+    c = np.maximum(c, np.concatenate([[problem.terms[k].effect.lowest] * found.b[k].shape[1] for k in members]))
     return c, float(2.0 * (-(b.T @ found.r) @ c) - c @ gram @ c) / found.noise
 
 

@@ -58,7 +58,11 @@ def advice(found: Search, best: Hypothesis, rivals: Sequence[Hypothesis], verdic
         gap, rival = min(((apart(found, best, h), h) for h in rivals[:SHOWN]), key=lambda pair: pair[0])
         names = [[problem.terms[k].effect.id for k in h.active] for h in (best, rival)]
         if gap < SEPARABLE:
-            times = f"about {SEPARABLE / gap:.2g} times the data" if gap > 0.1 else "no amount of the same data"
+            times = (
+                f"about {SEPARABLE / gap:.2g} times the data would"
+                if gap > 0.1
+                else "more of the same data would not help, a parameter known better might"
+            )
             said.append(words.separate(names[0], names[1], gap, times))
         gains = [
             (distance(problem, best, rival, [name]), name)

@@ -45,8 +45,20 @@ class Term:
 
     @property
     def counted(self) -> tuple[str, ...]:
-        """The parameters that a fit moves: a pinned coefficient stays at 1."""
+        """The parameters that a fit moves: a pinned coefficient stays at 1, a reference scale where it is."""
+        moving = tuple(name for name, inner in self.inner.items() if inner.moves)
+        return moving if self.effect.pinned else (*self.coefficients, *moving)
+
+    @property
+    def stated(self) -> tuple[str, ...]:
+        """The parameters that stand in the grown model: all but a pinned coefficient."""
         return tuple(self.inner) if self.effect.pinned else self.names
+
+    def parameter(self, name: str, value: float, low: float, high: float) -> Parameter:
+        """One of its parameters as the grown model has it."""
+        if name in self.inner and not self.inner[name].moves:
+            return Parameter(value, fixed=True)
+        return Parameter(value, free=True, bounds=(low, high))
 
     @property
     def key(self) -> tuple[str, str, str]:
@@ -82,14 +94,16 @@ def grown(model: Model, terms: Sequence[Term], numbers: Sequence[Mapping[str, Pa
     units = [brought(term, model) for term in terms]
     for term, at, unit in zip(terms, numbers, units, strict=True):
         names = _free(model, [*term.names, *term.states])
-        kept = [n for n in term.names if n in term.counted]
-        parameters = {names[n]: replace(at[n], unit=at[n].unit or unit[n]) for n in kept}
+        parameters = {names[n]: replace(at[n], unit=at[n].unit or unit[n]) for n in term.stated}
         if re.search(r"__(late|held)\b", term.text):
             entry = model.inputs[term.symbol]
             held: Hold = "linear" if entry.hold == "previous" else "previous"
             late = "__late" in term.text
             model = model.with_input(
-                term.symbol, parameters, delay=names[kept[0]] if late else None, hold=entry.hold if late else held
+                term.symbol,
+                parameters,
+                delay=names[term.stated[0]] if late else None,
+                hold=entry.hold if late else held,
             )
             continue
         text = _one(term, _renamed(term.text, names))

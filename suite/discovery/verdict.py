@@ -100,18 +100,18 @@ def _plausible(found: Search, weighing: Weighing, named: Hypothesis) -> list[tup
                 near = near or excess(problem, hypothesis.exact) <= NEAR * excess(problem, best.exact)
             if held < PLAUSIBLE * total or near:
                 chosen.append((hypothesis, _candidate(found, entry, hypothesis, separation)))
-                chosen += [(twin, _candidate(found, entry, twin, 0.0)) for twin in entry.twins]
+                # A shape's weight is counted with the physics that it cannot be told from.
+                chosen += [(t, _candidate(found, replace(entry, weight=0.0), t, 0.0)) for t in entry.twins]
         held += entry.weight
     return chosen
 
 
 def _candidate(found: Search, entry: Weighed, hypothesis: Hypothesis, separation: float | None) -> Candidate:
     problem = found.problem
-    share = entry.weight / (1 + len(entry.twins))
     first = problem.terms[hypothesis.active[0]]
     return Candidate(
         tuple(describe(problem, hypothesis)),
-        share,
+        entry.weight,
         entry.criterion,
         misfit.rmse(problem.record, hypothesis.exact.passed.Y, list(problem.model.outputs)),
         separation,

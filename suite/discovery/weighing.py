@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from suite.discovery.engine import Problem
 from suite.discovery.fit import Hypothesis, Level
@@ -18,6 +19,8 @@ from suite.discovery.probe import hidden_law
 from suite.discovery.result import Kind
 from suite.discovery.whiteness import ljung_box, whiteness
 
+Array = npt.NDArray[np.float64]
+
 SURE = 0.9  # weight from which a verdict names one effect
 REMAINS = 0.15  # of the error beyond the noise: what may remain for an effect to count as found, though not alone
 ODDS = 4.6  # of the criterion: an effect that no alarm calls for must be ten times likelier than none, 2 ln 10
@@ -25,12 +28,16 @@ DECISIVE = 10.0  # of the criterion: what a further effect must gain where the r
 PATCH = 0.1  # of its weight: what a patchwork of one law keeps beside a law that is not in the library
 WHITE = 1e-3  # Ljung-Box p below which the residual of the best shows a structure
 LESS = 0.4  # the most that all hypotheses hold together where the best leaves a structure
+CONVERGED = 0.01  # of the criterion: what a fit leaves open
+EVEN = 2.0  # of the criterion: what makes two hypotheses about as likely
 SAME = 0.05  # squared distance of two simulations, in noise units, below which no data could tell them apart
 
 
 @dataclass(frozen=True, eq=False)
 class Weighed:
-    """One hypothesis with its share of the weight and its criterion; `twins` give the same output on these data."""
+    """One hypothesis with its share of the weight and its criterion. `twins` are shapes that stand for no physics and
+    give the same output on these data; their weight is counted with it.
+    """
 
     hypothesis: Hypothesis
     weight: float
@@ -59,7 +66,9 @@ class Weighing:
 
 
 def weigh(found: Search) -> Weighing:
-    """Weights ~ exp(-EBIC/2), twins merged; where something remains, compared with it as process noise."""
+    """Weights ~ exp(-EBIC/2); where something remains, compared with it as process noise. What gives the same output
+    stands together, each physics by itself.
+    """
     everything = [found.base, *(h for h in found.fitted if not _hollow(found.problem, h))]
     best = min(everything, key=found.criterion)
     settled = not needs_more(found, best)
@@ -83,7 +92,7 @@ def weigh(found: Search) -> Weighing:
             groups.append([int(i)])
         else:
             home.append(int(i))
-    ranked = [_merged(found, [everything[i] for i in g], [values[i] for i in g], weights[g].tolist()) for g in groups]
+    ranked = [entry for g in groups for entry in _apart(found.problem, everything, values, weights, g)]
     return Weighing(tuple(ranked), settled, law)
 
 
@@ -117,21 +126,29 @@ def same(problem: Problem, one: Hypothesis, other: Hypothesis) -> bool:
     return bool(gap < SAME)
 
 
-def _merged(found: Search, members: list[Hypothesis], values: list[float], weights: list[float]) -> Weighed:
-    """One entry for hypotheses that are the same: physics before generic shapes, the plant before its sensors, then
-    the best criterion.
+def _apart(
+    problem: Problem, everything: Sequence[Hypothesis], values: Sequence[float], weights: Array, group: Sequence[int]
+) -> list[Weighed]:
+    """The entries of a group that gives one output: every physics with its own weight, the likeliest first, or the
+    plant before its sensors where they are about as likely; shapes and needless parts go with the first.
     """
-    terms = found.problem.terms
+    fewest = min(size(problem, everything[i]) for i in group)
+    simple = [i for i in group if size(problem, everything[i]) == fewest]
 
-    def order(i: int) -> tuple[int, int, float]:
-        own = [terms[k] for k in members[i].active]
-        return sum(term.effect.generic for term in own), sum(map(triage, own)), values[i]
+    def faults(i: int) -> tuple[bool, int, float]:
+        terms = [problem.terms[k] for k in everything[i].active]
+        return values[i] > min(values[j] for j in simple) + EVEN, sum(map(triage, terms)), values[i]
 
-    fewest = min(size(found.problem, h) for h in members)
-    simple = [i for i, h in enumerate(members) if size(found.problem, h) == fewest]
-    first = min(simple, key=order)
-    twins = tuple(members[i] for i in simple if i != first)
-    return Weighed(members[first], float(sum(weights)), values[first], twins)
+    physics = [i for i in simple if not any(problem.terms[k].effect.generic for k in everything[i].active)]
+    first, *others = sorted(physics or simple, key=faults)
+    others = others if physics else []
+    # What differs by less than a fit converges to does not differ; what is left over goes to these alike.
+    equal = [i for i in (first, *others) if i == first or abs(values[i] - values[first]) < CONVERGED]
+    rest = sum(weights[i] for i in group if i not in (first, *others))
+    even = float(sum(weights[i] for i in equal) + rest) / len(equal)
+    shapes = tuple(everything[i] for i in simple if i not in (first, *others))
+    entries = [Weighed(everything[i], even if i in equal else float(weights[i]), values[i]) for i in (first, *others)]
+    return [replace(entries[0], twins=shapes), *entries[1:]]
 
 
 def size(problem: Problem, hypothesis: Hypothesis) -> int:
@@ -142,8 +159,7 @@ def size(problem: Problem, hypothesis: Hypothesis) -> int:
 
 def kind(found: Search, weighing: Weighing) -> Kind:
     """Adequate: the base model is best and nothing remains. Unexplained: something remains that the library barely
-    touches. Ambiguous: no hypothesis has the weight, or the best leaves part of the error, or has a twin that is
-    physics too.
+    touches. Ambiguous: no hypothesis has the weight, or the best leaves part of the error.
     """
     base, best = found.base, weighing.best.hypothesis
     if best is base:
@@ -156,8 +172,7 @@ def kind(found: Search, weighing: Weighing) -> Kind:
     if not weighing.settled:
         before, after = excess(found.problem, base.exact), excess(found.problem, best.exact)
         return "ambiguous" if after < REMAINS * before else "unexplained"
-    physics = [h for h in weighing.best.twins if not any(found.problem.terms[k].effect.generic for k in h.active)]
-    return "missing_effect" if weighing.best.weight >= SURE and not physics else "ambiguous"
+    return "missing_effect" if weighing.best.weight >= SURE else "ambiguous"
 
 
 def excess(problem: Problem, level: Level) -> float:

@@ -67,7 +67,7 @@ def effect(named: Named) -> str:
     numbers = ", ".join(
         f"{name} = {value_sd(c.value, c.sd)}{f' {c.unit}' if c.unit else ''}" for name, c in named.coefficients.items()
     )
-    return f"{named.effect} in {named.equation} ({named.term}, {numbers})"
+    return f"{named.effect} in {named.equation} ({', '.join(filter(None, (named.term, numbers)))})"
 
 
 def value_sd(value: float, sd: float) -> str:
@@ -110,7 +110,7 @@ def separate(best: Sequence[str], rival: Sequence[str], apart: float, times: str
     """What it would take to tell two hypotheses apart."""
     return (
         f"These data hardly tell {' with '.join(best)} from {' with '.join(rival)} "
-        f"(delta^2 = {apart:.2g}, 16 is enough); {times} would, or a larger amplitude."
+        f"(delta^2 = {apart:.2g}, 16 is enough); {times}, or a larger amplitude."
     )
 
 
