@@ -56,7 +56,7 @@ class Pass:
 Kind = Callable[[Model, Record, Prior], Pass]
 
 
-class _SteppedEKF(ExtendedKalmanFilter):  # type: ignore[misc]
+class _SteppedEKF(ExtendedKalmanFilter):
     """filterpy's EKF with the plant's own step in place of x <- F x."""
 
     def __init__(self, states: int, outputs: int) -> None:

@@ -15,7 +15,7 @@ class UKFDisturbance(Estimator):
     """
 
     name = "ukf-disturbance"
-    tuning = {"q_scale": (1e-4, 1e4, "log")}  # noqa: RUF012
+    tuning = {"q_scale": (1e-4, 1e4, "log")}
 
-    def estimate(self, model: Model, record: Record, q_scale: float = 1.0) -> Estimate:  # type: ignore[override]
+    def estimate(self, model: Model, record: Record, q_scale: float = 1.0) -> Estimate:
         return with_disturbance(unscented, model, record, q_scale)

@@ -40,9 +40,7 @@ def test_the_kernel_is_150_times_as_fast_as_filterpy(benchmark: pytest.FixtureRe
         seconds.append(time.perf_counter() - start)
     np.testing.assert_allclose(ours.x, theirs.x, rtol=0.0, atol=1e-9)
     np.testing.assert_allclose(ours.P, theirs.P, rtol=0.0, atol=1e-9)
-    benchmark.pedantic(  # type: ignore[attr-defined]
-        filtered, args=(model, record, prior.x0, prior.P0, prior.Q, prior.R), rounds=20, warmup_rounds=2
-    )
-    ratio = min(seconds) / benchmark.stats.stats.min  # type: ignore[attr-defined]
+    benchmark.pedantic(filtered, args=(model, record, prior.x0, prior.P0, prior.Q, prior.R), rounds=20, warmup_rounds=2)
+    ratio = min(seconds) / benchmark.stats.stats.min
     print(f"filterpy {min(seconds) / len(record) * 1e6:.1f} us a step, {ratio:.0f} times the kernel's")
     assert ratio >= 150.0

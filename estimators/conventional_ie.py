@@ -18,9 +18,9 @@ class ConventionalIE(Estimator):
     """
 
     name = "conventional-ie"
-    tuning = {"q_scale": (1e-4, 1e6, "log")}  # noqa: RUF012
+    tuning = {"q_scale": (1e-4, 1e6, "log")}
 
-    def estimate(  # type: ignore[override]
+    def estimate(
         self, model: Model, record: Record, q_scale: float = 1.0, **options: Unpack[ContinuousOptions]
     ) -> Estimate:
         return continuous(model, record, 1.0, q_scale, **options)
@@ -30,9 +30,9 @@ class ConventionalIEDiscrete(Estimator):
     """Conventional IE, discrete time. Raol (2016), (63)-(74) with alpha = 1; arguments as `generalized-ie-discrete`."""
 
     name = "conventional-ie-discrete"
-    tuning = {"q_scale": (1e-4, 1e6, "log")}  # noqa: RUF012
+    tuning = {"q_scale": (1e-4, 1e6, "log")}
 
-    def estimate(  # type: ignore[override]
+    def estimate(
         self, model: Model, record: Record, q_scale: float = 1.0, **options: Unpack[DiscreteOptions]
     ) -> Estimate:
         return discrete(model, record, 1.0, q_scale, **options)

@@ -23,9 +23,9 @@ class RandomWalkSmoother(Estimator):
 
     name = "random-walk-smoother"
     kind = "smoother"
-    tuning = {"q_scale": (1e-4, 1e4, "log")}  # noqa: RUF012
+    tuning = {"q_scale": (1e-4, 1e4, "log")}
 
-    def estimate(self, model: Model, record: Record, q_scale: float = 1.0) -> Estimate:  # type: ignore[override]
+    def estimate(self, model: Model, record: Record, q_scale: float = 1.0) -> Estimate:
         prior = prior_of(record)
         grown, start = with_random_walk(model, record, prior, q_scale)
         n = len(model.states)

@@ -21,9 +21,9 @@ class GeneralizedIE(Estimator):
     """
 
     name = "generalized-ie"
-    tuning = {"alpha": (1e-4, 1e6, "log")}  # noqa: RUF012
+    tuning = {"alpha": (1e-4, 1e6, "log")}
 
-    def estimate(  # type: ignore[override]
+    def estimate(
         self,
         model: Model,
         record: Record,
@@ -44,9 +44,9 @@ class GeneralizedIEDiscrete(Estimator):
     """
 
     name = "generalized-ie-discrete"
-    tuning = {"alpha": (1e-4, 1e6, "log")}  # noqa: RUF012
+    tuning = {"alpha": (1e-4, 1e6, "log")}
 
-    def estimate(  # type: ignore[override]
+    def estimate(
         self, model: Model, record: Record, alpha: float = 1.0, q_scale: float = 1.0, **options: Unpack[DiscreteOptions]
     ) -> Estimate:
         return discrete(model, record, alpha, q_scale, **options)

@@ -32,9 +32,9 @@ class MinimumModelError(Estimator):
 
     name = "minimum-model-error"
     kind = "smoother"
-    tuning = {"alpha": (1e-4, 1e6, "log")}  # noqa: RUF012
+    tuning = {"alpha": (1e-4, 1e6, "log")}
 
-    def estimate(  # type: ignore[override]
+    def estimate(
         self, model: Model, record: Record, alpha: float = 1.0, q_scale: float = 1.0, Q: Array | None = None
     ) -> Estimate:
         prior = prior_of(record)

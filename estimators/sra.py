@@ -100,9 +100,9 @@ class SemiRobustAdaptive(Estimator):
     """
 
     name = "sra"
-    tuning = {"gamma_ratio": (0.5, 1e4, "log")}  # noqa: RUF012
+    tuning = {"gamma_ratio": (0.5, 1e4, "log")}
 
-    def estimate(  # type: ignore[override]
+    def estimate(
         self, model: Model, record: Record, gamma: float | None = None, gamma_ratio: float = 2.0, q_scale: float = 1.0,
         **options: Unpack[ContinuousOptions],
     ) -> Estimate:  # fmt: skip
@@ -118,9 +118,9 @@ class SemiRobustAdaptiveDiscrete(Estimator):
     """
 
     name = "sra-discrete"
-    tuning = {"gamma_ratio": (0.5, 1e4, "log")}  # noqa: RUF012
+    tuning = {"gamma_ratio": (0.5, 1e4, "log")}
 
-    def estimate(  # type: ignore[override]
+    def estimate(
         self, model: Model, record: Record, gamma: float | None = None, gamma_ratio: float = 2.0, q_scale: float = 1.0,
         **options: Unpack[DiscreteOptions],
     ) -> Estimate:  # fmt: skip

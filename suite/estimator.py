@@ -50,8 +50,11 @@ class Estimator(abc.ABC):
     tuning: ClassVar[Mapping[str, Range]] = {}
 
     @abc.abstractmethod
-    def estimate(self, model: Model, record: Record, **tuning: Any) -> Estimate:
-        """Estimate states and model error; inputs are not changed, the same call gives the same result."""
+    def estimate(self, model: Model, record: Record, *args: Any, **kwargs: Any) -> Estimate:
+        """Estimate states and model error; inputs are not changed, the same call gives the same result.
+
+        A subclass has the keywords that its `tuning` names, each with a default.
+        """
 
     def skip(self, model: Model, record: Record) -> str | None:
         """Why this method does not apply here, or None."""

@@ -100,7 +100,7 @@ def _parsed(text: str, names: frozenset[str], where: str) -> sympy.Expr:
     return _Translator(names, where, line).visit(tree.body)
 
 
-class _Plain(StrPrinter):  # type: ignore[misc]
+class _Plain(StrPrinter):
     """Text that `parse` reads back to the same numbers: all digits, our function names, two arguments at a time."""
 
     def _print_Float(self, expr: sympy.Float) -> str:

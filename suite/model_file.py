@@ -116,7 +116,8 @@ class _Reader(Document):
     def entry(self, place: str, value: Any, keys: Collection[str]) -> Mapping[str, Any]:
         """The long form of an entry: a table with known keys only."""
         self.known(place, value, keys)
-        return value  # type: ignore[no-any-return]
+        entry: Mapping[str, Any] = value
+        return entry
 
     def parameter(self, name: str, value: Any) -> Parameter:
         place = f"[parameters] {name}"

@@ -1,4 +1,4 @@
-"""The benchmark loses nothing, hides no failure, and reproduces the sources' Table 1."""
+"""A run of the benchmark loses nothing and hides no failure, whatever an estimator or the machine does."""
 
 from __future__ import annotations
 
@@ -10,15 +10,9 @@ import sys
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from suite.benchmark import claims, hashes, metrics, plan, statistics, table
-from suite.benchmark.cells import Cell
 from suite.benchmark.store import Store
-from suite.errors import InputError
-from suite.estimator import Estimate
-from suite.prior import default_prior
 
 # Foreign estimators that come by entry point, as another distribution's would; each call leaves a line in a log.
 FOREIGN = """
@@ -201,143 +195,3 @@ def test_two_writers_share_a_store(tmp_path: Path) -> None:
     assert [writer.wait(timeout=120) for writer in writers] == [0, 0]
     with Store(path) as store:
         assert len(store.rows()) == 400
-
-
-def test_table_1_is_reproduced_within_one_percent() -> None:
-    """All four printed numbers of Table 1 come from the one declared setting."""
-    ledger = {row["id"]: row for row in claims.ledger()}
-    for name in ("generalized-a3", "generalized-J", "conventional-a3", "conventional-J"):
-        row = ledger[f"table1-{name}"]
-        assert row["ours"] == pytest.approx(row["published"], rel=0.01)
-        assert row["status"] == "reproduced"
-        assert "a reconstruction, one of many" in row["setting"]
-    assert {tuple(row) for row in ledger.values()} == {
-        ("id", "source", "setting", "published", "ours", "tolerance", "status")
-    }
-
-
-def test_the_judge_finds_the_truth_perfect() -> None:
-    """The true states and model error score zero error, the true coefficients and the right shape."""
-    from suite import plugins
-
-    for name in ("paper-cubic", "paper-terms"):
-        case = plugins.cases()[name]
-        record, truth = case.simulate(0.0, 0)
-        record = record.with_prior(default_prior(case.deficient, record, truth.noise))
-        row = metrics.judge(case, record, truth, Estimate(x=truth.x, d=truth.d), "filter")
-        assert row["state_nrmse"] == 0.0
-        assert row["d_nrmse"] == 0.0
-        assert row["parameter_worst"] < 1e-9
-        assert row.get("named", 1) == 1
-
-
-def test_nis_and_nees_are_one_for_an_exact_filter() -> None:
-    """On a linear plant without model error the Kalman filter's NIS and NEES, as the judge computes them, are 1."""
-    from suite import plugins
-    from suite.case import Case, Experiment
-    from suite.model import Initial, Model, Output
-
-    model = Model("still", {"x": "0*x"}, outputs={"x": Output("x", "x")}, initial={"x": Initial(0.0, estimate=True)})
-    case = Case("still", "", model, truth=model, experiment=Experiment(60.0, 0.05, (1.0,)))
-    record, truth = case.simulate(0.0, 0)
-    rng = np.random.default_rng(3)
-    x = 1.0 + np.cumsum(0.1 * np.sqrt(0.05) * rng.standard_normal(len(record)))[:, None]
-    y = x + 0.05 * rng.standard_normal(x.shape)
-    from dataclasses import replace
-
-    record = replace(record, y=y)
-    prior = replace(default_prior(model, record, np.array([0.05])), Q=np.array([0.01]))
-    estimate = plugins.estimators()["ekf"].estimate(model, record.with_prior(prior))
-    row = metrics.judge(case, record.with_prior(prior), replace(truth, x=x), estimate, "filter")
-    assert row["nis"] == pytest.approx(1.0, abs=0.15)
-    assert row["nees"] == pytest.approx(1.0, abs=0.25)
-
-
-def test_failures_rank_last_and_are_counted() -> None:
-    """A failed seed makes the median worse, never the count smaller."""
-    good = [{"case": "c", "noise": 0.0, "estimator": "a", "variant": "default", "seed": s, "status": "ok", "reason": "",
-             "state_nrmse": 0.1} for s in range(3)]  # fmt: skip
-    bad = [{**row, "estimator": "b", "status": "diverged", "reason": "left"} for row in good]
-    lines = statistics.summarise([*bad, *good], ("state_nrmse",), reference="a")
-    assert [line["estimator"] for line in lines] == ["a", "b"]
-    assert (lines[1]["ok"], lines[1]["seeds"], lines[1]["reason"]) == (0, 3, "left")
-    assert np.isinf(lines[1]["state_nrmse"])
-    mean = statistics.ranks({"a": {0: 1.0, 1: 2.0}, "b": {0: 0.5}})
-    assert mean == {"a": 1.5, "b": 1.5}
-
-
-def test_holm_is_the_textbook_adjustment() -> None:
-    """Holm's p-values: sorted, times the number left, never decreasing, at most 1."""
-    assert statistics.holm([0.01, 0.04, 0.03, 0.5]) == pytest.approx([0.04, 0.09, 0.09, 0.5])
-
-
-def test_a_table_goes_to_every_format(tmp_path: Path) -> None:
-    """CSV, parquet and standard JSON hold the same rows; infinities become null in JSON."""
-    import pandas as pd
-
-    rows = [{"case": "c", "status": "ok", "J": float("inf"), "state_rmse": {"x1": 0.5}}]
-    for ending in (".csv", ".parquet", ".json"):
-        table.write(rows, tmp_path / f"t{ending}")
-    assert pd.read_csv(tmp_path / "t.csv")["state_rmse.x1"].tolist() == [0.5]
-    assert pd.read_parquet(tmp_path / "t.parquet")["state_rmse.x1"].tolist() == [0.5]
-    assert json.loads((tmp_path / "t.json").read_text())[0]["J"] is None
-    with pytest.raises(InputError, match="change the ending"):
-        table.write(rows, tmp_path / "t.xlsx")
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("cases = 3", "expected a list of names"),
-        ("seeds = 0", "must be positive"),
-        ("speed = 1", "is not an entry of a plan"),
-        ('variants = ["best"]', "expected some of default, tuned"),
-        ("cases = [", "not TOML"),
-    ],
-)
-def test_a_bad_plan_is_one_sentence(tmp_path: Path, text: str, said: str) -> None:
-    """What is wrong with a plan is said with its file."""
-    path = tmp_path / "p.toml"
-    path.write_text(text)
-    with pytest.raises(InputError, match=said) as caught:
-        plan.load(str(path))
-    assert "\n" not in str(caught.value)
-
-
-def test_shipped_plans_load() -> None:
-    """Every plan of the package is sound and has cells."""
-    for name in plan.shipped():
-        assert plan.load(name).cells()
-
-
-def test_keys_follow_what_they_depend_on() -> None:
-    """A cell's key is stable, and differs by seed."""
-    keys = hashes.Keys(None)
-    cell = Cell("paper-cubic", 0.05, "generalized-ie", "tuned", 0)
-    assert keys.cell(cell) == hashes.Keys(None).cell(cell)
-    assert keys.cell(cell) != keys.cell(Cell("paper-cubic", 0.05, "generalized-ie", "tuned", 1))
-
-
-def test_help_imports_nothing_heavy() -> None:
-    """Building the command line of `bench` imports no numerics."""
-    script = (
-        "import argparse, sys\nfrom suite.bench_verbs import add_parser\n"
-        "add_parser(argparse.ArgumentParser().add_subparsers())\n"
-        "print([m for m in ('numpy', 'scipy', 'numba', 'sympy', 'pandas', 'matplotlib') if m in sys.modules])"
-    )
-    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert run.stdout.strip() == "[]"
-
-
-def test_figures_come_from_stored_rows(tmp_path: Path) -> None:
-    """Figures are drawn from rows alone, with failures among them, as SVG and PNG."""
-    from suite.report import bench_figures
-
-    rows = [
-        {"case": "c", "noise": noise, "estimator": name, "variant": variant, "seed": seed, "reason": "",
-         "status": "diverged" if name == "b" else "ok", "state_nrmse": 0.1 + seed, "d_nrmse": 0.3, "step_us": 10.0}
-        for noise in (0.0, 0.05) for name in ("a", "b", "ekf") for variant in ("default", "tuned") for seed in range(3)
-    ]  # fmt: skip
-    paths = bench_figures.draw(rows, tmp_path)
-    assert {path.suffix for path in paths} == {".svg", ".png"}
-    assert all(path.stat().st_size > 1000 for path in paths)

@@ -80,7 +80,7 @@ def test_the_matrix_is_complete() -> None:
 
 @pytest.mark.parametrize("name", sorted(NAMES))
 @pytest.mark.parametrize("change", [lambda record: record, with_gaps, irregular], ids=["plain", "gaps", "irregular"])
-def test_an_estimate_has_the_contracts_shapes(name: str, change) -> None:  # type: ignore[no-untyped-def]
+def test_an_estimate_has_the_contracts_shapes(name: str, change) -> None:
     """Also with readings missing and irregular steps; a filter with a positive source ends well."""
     record = change(simulated())
     found = METHODS[name].estimate(DEFICIENT, record)
@@ -148,7 +148,7 @@ def test_a_record_without_prior_is_refused_with_the_mend(name: str) -> None:
 
 
 @pytest.mark.parametrize("change", [lambda record: record, with_gaps, irregular], ids=["plain", "gaps", "irregular"])
-def test_the_kernels_filter_is_filterpys(change) -> None:  # type: ignore[no-untyped-def]
+def test_the_kernels_filter_is_filterpys(change) -> None:
     """The compiled EKF gives filterpy's states and covariances to 1e-9, also where angles wrap and readings miss."""
     record = change(simulated(amplitude=8.0))
     wrapped = np.arctan2(np.sin(record.y[:, 0]), np.cos(record.y[:, 0]))

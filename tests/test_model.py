@@ -144,7 +144,7 @@ def test_names_of_the_generated_code_are_free_for_models() -> None:
 def test_a_model_that_exists_makes_sense(change: dict[str, object], sentence: str) -> None:
     """What is wrong with a model is said when it is made, with its place."""
     with pytest.raises(ModelError, match=sentence):
-        dataclasses.replace(OSCILLATOR, **change)  # type: ignore[arg-type]
+        dataclasses.replace(OSCILLATOR, **change)
 
 
 def test_a_step_follows_the_linear_hold() -> None:

@@ -18,7 +18,7 @@ from suite.model import Input, Model, Output, Parameter
 from suite.record import Record
 from suite.report import failure, figures
 from suite.report.canvas import thinned, timeline
-from suite.report.page import with_sd, write_figures, write_report
+from suite.report.page import write_figures, write_report
 from suite.report.vector import svg
 
 HOSTILE = '<script>alert("x")</script>&$a_b$'
@@ -291,11 +291,3 @@ def test_divergence_is_drawn() -> None:
     steep = replace(found.steps[0], comparison=replace(found.steps[0].comparison, error={"pos": 5.0}))
     fig = figures.waterfall(replace(found, steps=(steep, found.steps[1])))
     assert {"0.01", "0.1", "1"} <= {label.get_text() for label in fig.axes[0].get_yticklabels()}
-
-
-@pytest.mark.parametrize(
-    ("value", "sd", "text"), [(2.104, 0.083, "2.104 ± 0.083"), (2.1, 0.0, "2.1"), (812.4, 31.0, "812 ± 31")]
-)
-def test_digits_follow_the_sd(value: float, sd: float, text: str) -> None:
-    """A value is written to the digit that its standard deviation reaches."""
-    assert with_sd(value, sd) == text

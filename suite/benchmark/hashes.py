@@ -87,7 +87,7 @@ def case(entry: Case, data: Path | None) -> str:
     assert e is not None
     times = np.arange(0.0, e.duration, e.dt)
     inputs = {name: _array(np.array([f(float(t)) for t in times])) for name, f in e.inputs.items()}
-    return _digest(*models, e.duration, e.dt, e.x0, inputs)
+    return _digest(*models, e.duration, e.dt, e.x0, inputs, dict(e.every))
 
 
 def _array(values: Any) -> str:

@@ -65,7 +65,7 @@ def coefficients(case: Case, record: Record, estimate: Estimate) -> dict[str, An
 
     The terms are the derivatives of the true rates by the coefficients; `parameter_error` is relative.
     """
-    if not case.missing or case.truth is None or estimate.d is None:
+    if not _in_rates(case) or case.truth is None or estimate.d is None:
         return {}
     columns = list(case.truth.parameters)
     values = case.truth.values
@@ -88,7 +88,7 @@ def named(case: Case, truth: Truth, estimate: Estimate) -> dict[str, Any]:
 
     Judged where one term is missing and one of the shapes is that term (|cosine| > 0.999 at the true states).
     """
-    if len(case.missing) != 1 or estimate.d is None:
+    if len(case.missing) != 1 or not _in_rates(case) or estimate.d is None:
         return {}
     i = list(case.deficient.states).index(case.missing[0].equation)
     true = _cosines(case.deficient, truth.x, truth.d[:, i])
@@ -98,6 +98,14 @@ def named(case: Case, truth: Truth, estimate: Estimate) -> dict[str, Any]:
     said = _cosines(case.deficient, estimate.x, estimate.d[:, i])
     best = max(said, key=lambda name: said[name])
     return {"named_as": best, "named": int(best == right)}
+
+
+def _in_rates(case: Case) -> bool:
+    """Whether what is missing are terms of the rates of the states that an estimate has; a plant with states of its own
+    has no terms at the estimated ones.
+    """
+    same = case.truth is not None and list(case.truth.states) == list(case.deficient.states)
+    return bool(case.missing) and same and all(m.equation in case.deficient.states for m in case.missing)
 
 
 def _cosines(model: Model, x: Array, d: Array) -> dict[str, float]:

@@ -76,6 +76,7 @@ def targets(rows: Sequence[Row]) -> list[dict[str, Any]]:
         _counted("cover", "95 % intervals that cover", int((np.abs(z) < 1.96).sum()), len(z), band),
         _share("false alarm", "false alarm on complete models", nulls, "alarm", "<= 0.02"),
         _share("none of these", "'none explains it' for an effect outside the library", outside, unexplained, ">= 0.9"),
+        _share("none of these, outright", "  said as its verdict", outside, outright, ">= 0.9"),
         _share("none of these, far", "  where every stand-in is 16 away", beyond, unexplained, ">= 0.9"),
         _figure("residual", "residual / sigma with the named effect, median", left, _median, "0.95 to 1.05"),
         _share("white", "residual white (Ljung-Box p >= 0.01)", stated, white, ">= 0.95"),
@@ -94,6 +95,11 @@ def wrong(row: Row) -> bool:
     return not row.get("exact_merged", False)
 
 
+def outright(row: Row) -> bool:
+    """Whether the verdict itself is that nothing in the library explains it."""
+    return row.get("verdict") == "unexplained"
+
+
 def unexplained(row: Row) -> bool:
     """Whether the verdict holds it likeliest that nothing in the library explains it: it says so, or gives "none of
     these" more weight than any hypothesis.
@@ -101,7 +107,7 @@ def unexplained(row: Row) -> bool:
     weights = list(row.get("plausible_weights") or [])
     none = 1.0 - sum(weights)
     likeliest = row.get("verdict") == "ambiguous" and none > max(weights, default=1.0)
-    return row.get("verdict") == "unexplained" or likeliest
+    return outright(row) or likeliest
 
 
 def white(row: Row) -> bool:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -157,8 +158,8 @@ class Problem(Frame):
         x0 = np.hstack([x0, np.zeros((len(x0), sum(len(t.states) for t in terms)))])
         return replace(self, terms=terms, start=Point(x0, p))
 
-    def on(self, record: Record, start: Point, **changes: object) -> Problem:
+    def on(self, record: Record, start: Point, **changes: Any) -> Problem:
         """The same hypotheses beside another record; nothing is compiled again."""
-        other = replace(self, record=record, start=start, **changes)  # type: ignore[arg-type]
+        other = replace(self, record=record, start=start, **changes)
         other.__dict__["program"] = self.program
         return other

@@ -10,12 +10,14 @@ import numpy.typing as npt
 from suite.discovery.engine import Point, Problem
 from suite.discovery.fit import LEVELS, Hypothesis, homotopy
 from suite.discovery.identify import WORTH, Search, left, search
+from suite.discovery.patchwork import hollow, patched
 from suite.discovery.starts import brought
 
 Array = npt.NDArray[np.float64]
 
-LONG = 8192  # samples from which a record is searched in a block of it
+LONG = 4096  # samples from which a record is searched in a block of it
 BLOCK = 2000  # samples of that block
+FEWEST = 10  # samples of a run in it
 FINALISTS = 2  # effects that are fitted to the whole record, and the best combination where it is worth it
 
 
@@ -24,42 +26,45 @@ def search_long(problem: Problem) -> Search:
     base = homotopy(problem, problem.start)
     small = _block(problem, base)
     found = search(small)
-    singles = sorted((h for h in found.fitted if len(h.active) == 1), key=found.criterion)[:FINALISTS]
-    best = min(found.fitted, key=found.criterion, default=None)
+    said = [h for h in found.fitted if not (patched(small, h) or hollow(small, h))]
+    singles = sorted((h for h in said if len(h.active) == 1), key=found.criterion)[:FINALISTS]
+    best = min(said, key=found.criterion, default=None)
     finalists = list(singles)
-    if best is not None and len(best.active) > 1 and left(best) < WORTH * min(map(left, singles)):
+    if best is not None and len(best.active) > 1 and left(best) < WORTH * min(map(left, singles), default=np.inf):
         finalists.append(best)
     fitted = [_whole(problem, base, h) for h in finalists]
     return Search(problem, base, tuple(fitted), found.absorbed, found.frequencies, found.scores, block=found)
 
 
 def _block(problem: Problem, base: Hypothesis) -> Problem:
-    """The problem on the part of a run where the base model's error is largest; its first state is free."""
-    record = problem.record
+    """The problem on the part of the record where the base model's error is largest; its first states are free."""
+    record, n = problem.record, len(problem.model.states)
     level = base.exact if base.exact.passed.finite else base.best
     square = np.zeros(problem.seen.shape)
     square[problem.seen] = level.passed.e**2
     each = square.sum(axis=1)
-    best, at = -1.0, (0, min(BLOCK, len(record)))
-    for first, last in zip(record.bounds[:-1], record.bounds[1:], strict=True):
-        for start in range(int(first), max(int(last) - BLOCK, int(first)) + 1, BLOCK // 2):
-            end = min(start + BLOCK, int(last))
-            if each[start:end].mean() > best and end - start > BLOCK // 4:
-                best, at = float(each[start:end].mean()), (start, end)
-    start, end = at
-    x0 = np.zeros((1, problem.start.x0.shape[1]))
-    x0[0, : len(problem.model.states)] = base.best.passed.X[start, : len(problem.model.states)]
-    part = replace(record.part(start, end), names=())
-    small = problem.on(
-        part, Point(x0, problem.start.p), path=problem.path[start:end], free_x0=np.ones_like(problem.free_x0)
-    )
-    point = small.start
+    first = max(range(0, len(record) - BLOCK + 1, BLOCK // 2), key=lambda at: float(each[at : at + BLOCK].mean()))
+    last = first + BLOCK
+    # A run that ends or begins at the edge with a sample or two is left out.
+    inner = [s for s in record.starts if first < s < last]
+    first = next((s for s in inner if s - first < FEWEST), first)
+    last = next((s for s in inner if last - s < FEWEST), last)
+    starts = [first, *(s for s in inner if first < s < last)]
+    part = replace(
+        record, t=record.t[first:last], u=record.u[first:last], y=record.y[first:last],
+        starts=tuple(s - first for s in starts), names=(),
+    )  # fmt: skip
+    x0 = np.zeros((len(starts), problem.start.x0.shape[1]))
+    x0[:, :n] = base.best.passed.X[starts, :n]
+    start = Point(x0, problem.start.p)
+    small = problem.on(part, start, path=problem.path[first:last], free_x0=np.ones_like(problem.free_x0))
     for k in range(len(problem.terms)):
-        point = brought(small, point, k)
+        start = brought(small, start, k)
+    small = small.on(part, start)
     # Inner scales keep the units of the whole record, so that the finalists mean the same on both.
     small.__dict__["reach"] = problem.reach
     small.__dict__["limits"] = problem.limits
-    return small.on(part, point, R=problem.R)
+    return small
 
 
 def _whole(problem: Problem, base: Hypothesis, hypothesis: Hypothesis) -> Hypothesis:

@@ -169,6 +169,15 @@ def idle(found: Search, named: Hypothesis) -> tuple[int, ...]:
     return tuple(spared)
 
 
+def foretold(found: Search, named: Hypothesis) -> float:
+    """The error on held-out data with a hypothesis, as a part of the base model's; 1 where nothing can be held out."""
+    parts = split(found.problem.record)
+    if parts is None:
+        return 1.0
+    before, after = (_together(found.problem, _held(found, h, parts)) for h in (found.base, named))
+    return float(np.sqrt(after / before)) if 0.0 < before < np.inf else 1.0
+
+
 def _together(problem: Problem, error: dict[str, float]) -> float:
     """Sum of squared errors in noise units; infinite where a simulation ran away."""
     total = float(sum((value / sigma) ** 2 for value, sigma in zip(error.values(), np.sqrt(problem.R), strict=True)))

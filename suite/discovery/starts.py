@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import lru_cache
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -130,4 +131,5 @@ def brought(problem: Problem, point: Point, k: int) -> Point:
 def _function(text: str, names: tuple[str, ...]) -> Callable[..., float]:
     """A text as a function of the named values."""
     expression = expressions.parse(text, set(names) - {expressions.TIME}, "first value of an added state")
-    return sympy.lambdify([expressions.symbol(name) for name in names], expression, "math")  # type: ignore[no-any-return]
+    compiled: Callable[..., Any] = sympy.lambdify([expressions.symbol(name) for name in names], expression, "math")
+    return compiled

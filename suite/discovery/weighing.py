@@ -12,9 +12,10 @@ import numpy.typing as npt
 
 from suite.discovery.engine import Problem
 from suite.discovery.fit import Hypothesis, Level
-from suite.discovery.identify import ALARM, Search, needs_more
+from suite.discovery.identify import ALARM, Search, left, needs_more
 from suite.discovery.library import triage
-from suite.discovery.outcome import residual
+from suite.discovery.outcome import foretold, residual
+from suite.discovery.patchwork import hollow, patched
 from suite.discovery.probe import hidden_law
 from suite.discovery.result import Kind
 from suite.discovery.whiteness import ljung_box, whiteness
@@ -23,6 +24,7 @@ Array = npt.NDArray[np.float64]
 
 SURE = 0.9  # weight from which a verdict names one effect
 REMAINS = 0.15  # of the error beyond the noise: what may remain for an effect to count as found, though not alone
+PART = 0.6  # the same where held-out data confirm it
 ODDS = 4.6  # of the criterion: an effect that no alarm calls for must be ten times likelier than none, 2 ln 10
 DECISIVE = 10.0  # of the criterion: what a further effect must gain where the residual does not become white
 PATCH = 0.1  # of its weight: what a patchwork of one law keeps beside a law that is not in the library
@@ -69,7 +71,7 @@ def weigh(found: Search) -> Weighing:
     """Weights ~ exp(-EBIC/2); where something remains, compared with it as process noise. What gives the same output
     stands together, each physics by itself.
     """
-    everything = [found.base, *(h for h in found.fitted if not _hollow(found.problem, h))]
+    everything = [found.base, *(h for h in found.fitted if not hollow(found.problem, h))]
     best = min(everything, key=found.criterion)
     settled = not needs_more(found, best)
     law = hidden_law(found.problem, best) if settled else None
@@ -84,7 +86,7 @@ def weigh(found: Search) -> Weighing:
     # What stands in for a law that is not in the library leaves most of its weight to that.
     weights = weights * np.where([patched(found.problem, h) for h in everything], PATCH, 1.0)
     if not settled:
-        weights = weights * _told(found.problem, everything[order[0]])
+        weights = weights * _told(found, everything[order[0]])
     groups: list[list[int]] = []
     for i in order:
         home = next((g for g in groups if same(found.problem, everything[g[0]], everything[i])), None)
@@ -94,27 +96,6 @@ def weigh(found: Search) -> Weighing:
             home.append(int(i))
     ranked = [entry for g in groups for entry in _apart(found.problem, everything, values, weights, g)]
     return Weighing(tuple(ranked), settled, law)
-
-
-def patched(problem: Problem, hypothesis: Hypothesis) -> bool:
-    """Whether effects of one law act together in one equation, or a shape stands for no physics at all: they imitate
-    one law that the library does not hold, at the price of one law less than they are. Two faults of the instruments
-    at once imitate anything as well.
-    """
-    terms = [problem.terms[k] for k in hypothesis.active]
-    laws = [(term.equation, term.effect.law) for term in terms if term.effect.law]
-    if sum(map(triage, terms)) > 1:
-        return True
-    return len(laws) > len(set(laws)) or any(term.effect.generic and term.effect.inner for term in terms)
-
-
-def _hollow(problem: Problem, hypothesis: Hypothesis) -> bool:
-    """Whether a coefficient that cannot be negative ended at zero: a simpler hypothesis says the same."""
-    p = hypothesis.exact.point.p
-    return any(
-        term.effect.sign and (p[problem.places(k)[: len(term.coefficients)]] == 0.0).any()
-        for k, term in ((k, problem.terms[k]) for k in hypothesis.active)
-    )
 
 
 def same(problem: Problem, one: Hypothesis, other: Hypothesis) -> bool:
@@ -159,7 +140,8 @@ def size(problem: Problem, hypothesis: Hypothesis) -> int:
 
 def kind(found: Search, weighing: Weighing) -> Kind:
     """Adequate: the base model is best and nothing remains. Unexplained: something remains that the library barely
-    touches. Ambiguous: no hypothesis has the weight, or the best leaves part of the error.
+    touches. Ambiguous: no hypothesis has the weight, or the best leaves part of the error: a small part, or one that
+    is smaller by as much on data that were not fitted.
     """
     base, best = found.base, weighing.best.hypothesis
     if best is base:
@@ -171,7 +153,9 @@ def kind(found: Search, weighing: Weighing) -> Kind:
         return "unexplained" if len(best.active) > 1 else "ambiguous"
     if not weighing.settled:
         before, after = excess(found.problem, base.exact), excess(found.problem, best.exact)
-        return "ambiguous" if after < REMAINS * before else "unexplained"
+        if after >= REMAINS * before and not (after < PART * before and foretold(found, best) < PART):
+            return "unexplained"
+        return "ambiguous"
     return "missing_effect" if weighing.best.weight >= SURE else "ambiguous"
 
 
@@ -197,15 +181,18 @@ def _thrifty(found: Search, everything: Sequence[Hypothesis]) -> list[Hypothesis
     ]  # fmt: skip
 
 
-def _told(problem: Problem, best: Hypothesis) -> float:
+def _told(found: Search, best: Hypothesis) -> float:
     """The share of the best one's residual variance that is noise. The rest goes to what is not in the library: a
-    hypothesis that leaves a structure cannot be the whole truth, however far ahead of its rivals it is; where the
-    residual itself shows one, it is less likely than not.
+    hypothesis that leaves a structure cannot be the whole truth, however far ahead of its rivals it is. Where the
+    residual itself shows one, it is less likely than not; where held-out data bear it out, not much less.
     """
+    problem = found.problem
     if not best.exact.passed.finite:
         return 0.0
-    share = min(1.0, 1.0 / max(float(np.mean(best.exact.passed.e**2)), 1e-12))
+    share = min(1.0, 1.0 / max(left(best), 1e-12))
     names = list(problem.model.outputs)
     e = problem.whitened(residual(problem, best.exact))
     white = ljung_box(whiteness(problem.record, e, names), problem.count // len(names), 0) > WHITE
-    return share if white and hidden_law(problem, best) is None else min(share, LESS)
+    if white and hidden_law(problem, best) is None:
+        return share
+    return LESS if best.active and foretold(found, best) < PART else min(share, LESS)

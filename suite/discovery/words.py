@@ -57,6 +57,11 @@ def _several(verdict: Verdict) -> str:
     rivals = [" with ".join(named.effect for named in c.effects) + f" ({weight(c.weight)})" for c in verdict.plausible]
     more = f" and {len(rivals) - 5} more" if len(rivals) > 5 else ""
     rest = 1.0 - sum(candidate.weight for candidate in verdict.plausible)
+    if rest > max(candidate.weight for candidate in verdict.plausible):
+        return (
+            f"An effect is missing; closest: {', '.join(rivals[:5])}{more}; "
+            f"but more likely none of these is all of it ({weight(rest)})."
+        )
     none = f"; or none of these ({weight(rest)})" if rest > 0.02 else ""
     opening = "An effect is missing; plausible: " if len(rivals) > 1 else "An effect is missing; most likely "
     return f"{opening}{', '.join(rivals[:5])}{more}{none}."

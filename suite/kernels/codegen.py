@@ -78,15 +78,25 @@ class Program:
     def rates(self, t: float, x: Array, u: Sequence[float] | Array, p: Array) -> tuple[Array, Array, Array]:
         """f, df/dx, df/dp at one point, all gates off."""
         dx, Fx, Fp = np.zeros(self.n), np.zeros((self.n, self.n)), np.zeros((self.n, self.parameters))
-        self.rate(float(t), _vector(x), _vector(u), _vector(p), self.all_off(), dx, Fx, Fp)
+        self.rate(float(t), *self._vectors(x, u, p), self.all_off(), dx, Fx, Fp)
         return dx, Fx, Fp
 
     def outputs(self, t: float, x: Array, u: Sequence[float] | Array, p: Array) -> tuple[Array, Array, Array]:
         """h, dh/dx, dh/dp at one point, all gates off."""
         ny = self.outputs_count
         y, Hx, Hp = np.zeros(ny), np.zeros((ny, self.n)), np.zeros((ny, self.parameters))
-        self.output(float(t), _vector(x), _vector(u), _vector(p), self.all_off(), y, Hx, Hp)
+        self.output(float(t), *self._vectors(x, u, p), self.all_off(), y, Hx, Hp)
         return y, Hx, Hp
+
+    def _vectors(self, x: Array, u: Sequence[float] | Array, p: Array) -> tuple[Array, Array, Array]:
+        """The arguments as the machine code reads them; it does not look how long they are."""
+        given = (_vector(x), _vector(u), _vector(p))
+        if tuple(map(len, given)) != (self.n, self.inputs, self.parameters):
+            raise ValueError(
+                f"expected {self.n} states, {self.inputs} inputs and {self.parameters} parameters, "
+                f"got {', '.join(str(len(v)) for v in given)}"
+            )
+        return given
 
 
 def _vector(values: Sequence[float] | Array) -> Array:

@@ -11,13 +11,13 @@ import sympy
 ZERO = sympy.Integer(0)
 
 
-class TamePower(sympy.Function):  # type: ignore[misc]
+class TamePower(sympy.Function):
     """x^w in a slope: zero where x is."""
 
     is_real = True
 
 
-class TameLog(sympy.Function):  # type: ignore[misc]
+class TameLog(sympy.Function):
     """log x in a slope: zero where x is."""
 
     is_real = True

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -197,7 +198,8 @@ def _function(
     """A text as a function of what is known and of the numbers, in this order."""
     names = [*known, *numbers]
     expression = expressions.parse(text, set(names) - {expressions.TIME}, f"the term {text}")
-    return sympy.lambdify([expressions.symbol(name) for name in names], expression, kind)  # type: ignore[no-any-return]
+    compiled: Callable[..., Any] = sympy.lambdify([expressions.symbol(name) for name in names], expression, kind)
+    return compiled
 
 
 def _integrated(effect: Effect, known: Mapping[str, Array], numbers: Mapping[str, float], t: Array) -> dict[str, Array]:
