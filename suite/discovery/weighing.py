@@ -24,7 +24,7 @@ Array = npt.NDArray[np.float64]
 
 SURE = 0.9  # weight from which a verdict names one effect
 REMAINS = 0.15  # of the error beyond the noise: what may remain for an effect to count as found, though not alone
-PART = 0.6  # the same where held-out data confirm it
+PART = 0.35  # the same where held-out data confirm it
 ODDS = 4.6  # of the criterion: an effect that no alarm calls for must be ten times likelier than none, 2 ln 10
 DECISIVE = 10.0  # of the criterion: what a further effect must gain where the residual does not become white
 PATCH = 0.1  # of its weight: what a patchwork of one law keeps beside a law that is not in the library
