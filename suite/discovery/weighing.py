@@ -24,7 +24,8 @@ Array = npt.NDArray[np.float64]
 
 SURE = 0.9  # weight from which a verdict names one effect
 REMAINS = 0.15  # of the error beyond the noise: what may remain for an effect to count as found, though not alone
-PART = 0.35  # the same where held-out data confirm it
+PART = 0.35  # the same where held-out data confirm it, or what remains is
+AUDIBLE = 1.0  # of the noise's deviation, or less
 ODDS = 4.6  # of the criterion: an effect that no alarm calls for must be ten times likelier than none, 2 ln 10
 DECISIVE = 10.0  # of the criterion: what a further effect must gain where the residual does not become white
 PATCH = 0.1  # of its weight: what a patchwork of one law keeps beside a law that is not in the library
@@ -141,7 +142,7 @@ def size(problem: Problem, hypothesis: Hypothesis) -> int:
 def kind(found: Search, weighing: Weighing) -> Kind:
     """Adequate: the base model is best and nothing remains. Unexplained: something remains that the library barely
     touches. Ambiguous: no hypothesis has the weight, or the best leaves part of the error: a small part, or one that
-    is smaller by as much on data that were not fitted.
+    is hardly audible beside the noise, or as much smaller on data that were not fitted.
     """
     base, best = found.base, weighing.best.hypothesis
     if best is base:
@@ -153,9 +154,8 @@ def kind(found: Search, weighing: Weighing) -> Kind:
         return "unexplained" if len(best.active) > 1 else "ambiguous"
     if not weighing.settled:
         before, after = excess(found.problem, base.exact), excess(found.problem, best.exact)
-        if after >= REMAINS * before and not (after < PART * before and foretold(found, best) < PART):
-            return "unexplained"
-        return "ambiguous"
+        near = after < REMAINS * before or (after < AUDIBLE and after < PART * before)
+        return "ambiguous" if near or (after < PART * before and foretold(found, best) < PART) else "unexplained"
     return "missing_effect" if weighing.best.weight >= SURE else "ambiguous"
 
 
