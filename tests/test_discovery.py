@@ -12,8 +12,8 @@ import pytest
 from suite import plugins
 from suite.case import Case, Experiment
 from suite.discovery.discrepancy import discrepancy
-from suite.discovery.engine import Point
 from suite.discovery.fit import fit, prepare
+from suite.discovery.frame import Point
 from suite.discovery.library import candidates
 from suite.discovery.loop import discover
 from suite.discovery.noise import noise_variance

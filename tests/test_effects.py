@@ -13,8 +13,9 @@ import numpy.typing as npt
 import pytest
 
 from suite import plugins
-from suite.discovery.engine import Layout, Point, Problem
+from suite.discovery.engine import Problem
 from suite.discovery.fit import EXACT, prepare
+from suite.discovery.frame import Layout, Point
 from suite.discovery.library import candidates
 from suite.discovery.misfit import simulate
 from suite.discovery.terms import Term, grown

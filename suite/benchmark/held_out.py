@@ -17,6 +17,7 @@ from suite import plugins
 from suite.benchmark import table
 from suite.case import Case, Held
 from suite.discovery import misfit
+from suite.discovery.hold_out import split
 from suite.discovery.loop import discover
 from suite.discovery.result import Ledger
 from suite.effect import Effect
@@ -59,7 +60,7 @@ def parts(case: Case, folder: Path | None) -> tuple[Record, Mapping[str, Held]]:
     record = case.measured(folder)
     if case.held_out is not None:
         return record, case.held_out(folder)
-    cut = misfit.split(record)
+    cut = split(record)
     if cut is None:
         raise DataError(f"{case.name}: {len(record)} samples are too few to hold some out; name them in held_out")
     name = "last run" if cut.first == 0 else "last 30 %"

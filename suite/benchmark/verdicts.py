@@ -18,8 +18,9 @@ import numpy.typing as npt
 from scipy.stats import chi2
 
 from suite.benchmark.conditions import Trial
-from suite.discovery.engine import Point, Problem
+from suite.discovery.engine import Problem
 from suite.discovery.fit import Hypothesis, homotopy
+from suite.discovery.frame import Point
 from suite.discovery.identify import Search
 from suite.discovery.result import Named, Verdict
 from suite.discovery.separability import SEPARABLE, distance

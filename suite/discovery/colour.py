@@ -14,9 +14,9 @@ import numpy.typing as npt
 from suite.discovery.engine import Problem
 from suite.discovery.fit import Hypothesis, Level, levenberg_marquardt
 from suite.discovery.identify import ALARM, REFITTED, Search, needs_more, refit
-from suite.discovery.outcome import residual
+from suite.discovery.outcome import residual, white
 from suite.discovery.scoring import score
-from suite.discovery.whiteness import ljung_box, whiteness
+from suite.discovery.whiteness import whiteness
 
 Array = npt.NDArray[np.float64]
 
@@ -32,7 +32,7 @@ def coloured(found: Search) -> Search:
     best = min([found.base, *found.fitted], key=found.criterion)
     if problem.colour is not None or not best.exact.passed.finite:
         return found
-    if not needs_more(found, best) and _p(problem, best.exact) > WHITE:
+    if not needs_more(found, best) and white(problem, best.exact) > WHITE:
         return found
     rho = memory(problem, best.exact)
     if not (np.abs(rho) > 2.0 / np.sqrt(problem.count / len(rho))).any():
@@ -50,7 +50,7 @@ def coloured(found: Search) -> Search:
     price = len(rho) * np.log(problem.count)
     rival = min(found.criterion(h, h.best) for h in (found.base, *found.fitted))
     better = trial.criterion(chosen) + price < rival - ALARM
-    return trial if better and _p(changed, chosen.exact) > WHITE else found
+    return trial if better and white(changed, chosen.exact) > WHITE else found
 
 
 def memory(problem: Problem, level: Level) -> Array:
@@ -63,9 +63,3 @@ def _refitted(problem: Problem, hypothesis: Hypothesis) -> Hypothesis:
     """The hypothesis at q = 0 alone: a memory of the sensor's noise stands in place of a process noise."""
     level = levenberg_marquardt(problem, hypothesis.exact.point, 0.0, hypothesis.active, 30, 1e-3)
     return Hypothesis(hypothesis.active, (level,), problem.layout(hypothesis.active))
-
-
-def _p(problem: Problem, level: Level) -> float:
-    names = list(problem.model.outputs)
-    e = problem.whitened(residual(problem, level))
-    return ljung_box(whiteness(problem.record, e, names), problem.count // len(names), 0)

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from suite.discovery.engine import Layout, Problem
+from suite.discovery.engine import Problem
 from suite.discovery.fit import Level, covariance
+from suite.discovery.frame import Layout
 
 Array = npt.NDArray[np.float64]
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from suite.discovery.engine import Point, Problem
+from suite.discovery.engine import Problem
+from suite.discovery.frame import Point
 from suite.discovery.result import Discrepancy
 from suite.discovery.variable import ordered
 from suite.filtering import Filtered, filtered

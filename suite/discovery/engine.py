@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from suite.discovery.frame import Frame, Index, Layout, Point
+from suite.discovery.frame import Frame, Layout, Point
 from suite.discovery.noise import QUIETEST, spans
 from suite.discovery.terms import Term
 from suite.kernels.integrate import workspace
@@ -20,8 +20,6 @@ from suite.kernels.prediction import prediction_errors
 from suite.record import Record
 
 Array = npt.NDArray[np.float64]
-
-__all__ = ["Index", "Layout", "Pass", "Point", "Problem"]
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,8 @@ import numpy.typing as npt
 
 from suite.delays import acting
 from suite.discovery.chaos import stretches
-from suite.discovery.engine import Index, Layout, Pass, Point, Problem
+from suite.discovery.engine import Pass, Problem
+from suite.discovery.frame import Index, Layout, Point
 from suite.discovery.noise import noise_variance, without_outliers
 from suite.discovery.starts import brought, check_record, first_states, pace_of, rough_path, start_of
 from suite.discovery.terms import Term

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from suite.discovery.engine import Point, Problem
+from suite.discovery.engine import Problem
 from suite.discovery.fit import LEVELS, RISEN, Hypothesis, Level, homotopy, polish
+from suite.discovery.frame import Point
 from suite.discovery.library import incompatible
 from suite.discovery.noise import spans
 from suite.discovery.scoring import Score, absorbed, frequencies, is_tone, pairs, score

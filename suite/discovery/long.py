@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from suite.discovery.engine import Point, Problem
+from suite.discovery.engine import Problem
 from suite.discovery.fit import LEVELS, Hypothesis, homotopy
+from suite.discovery.frame import Point
 from suite.discovery.identify import WORTH, Search, left, search
 from suite.discovery.patchwork import hollow, patched
 from suite.discovery.starts import brought

@@ -9,7 +9,7 @@ from suite.discovery import misfit
 from suite.discovery.discrepancy import discrepancy
 from suite.discovery.fit import summarise
 from suite.discovery.identify import Search
-from suite.discovery.outcome import amended
+from suite.discovery.outcome import amended, residual
 from suite.discovery.result import Ledger, Step, Verdict
 from suite.discovery.verdict import investigate, judge
 from suite.discovery.where import where
@@ -61,14 +61,13 @@ def _step(found: Search, verdict: Verdict) -> Step:
     comparison = misfit.compare(fitted.model, problem.record, base.exact.passed.Y, problem.R**0.5)
     error = discrepancy(problem, base.exact.point)
     said = where(error, problem.record, problem.model)
-    residual = (problem.record.y - base.exact.passed.Y) / problem.R**0.5
     held = verdict.error.get("held_out", {}).get("before", {})
     return Step(
         fitted.model,
         replace(comparison, sentence=f"{comparison.sentence} {said}"),
         held,
         error,
-        whiteness(problem.record, residual, names),
+        whiteness(problem.record, residual(problem, base.exact), names),
         verdict,
     )
 

@@ -9,14 +9,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-from suite.discovery.discrepancy import discrepancy as discrepancy
 from suite.discovery.fit import homotopy, prepare
-from suite.discovery.hold_out import Split as Split
-from suite.discovery.hold_out import split as split
 from suite.discovery.noise import noise_variance
 from suite.discovery.result import Comparison
-from suite.discovery.whiteness import ljung_box as ljung_box
-from suite.discovery.whiteness import whiteness as whiteness
 from suite.model import Model
 from suite.record import Record
 

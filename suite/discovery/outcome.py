@@ -8,12 +8,14 @@ import numpy as np
 import numpy.typing as npt
 
 from suite.discovery import misfit
-from suite.discovery.engine import Point, Problem
+from suite.discovery.engine import Problem
 from suite.discovery.fit import LEVELS, Hypothesis, Level, covariance, homotopy, summarise
+from suite.discovery.frame import Point
 from suite.discovery.hold_out import Split, split
 from suite.discovery.identify import Search
 from suite.discovery.result import Coefficient, Named
 from suite.discovery.terms import grown
+from suite.discovery.whiteness import ljung_box, whiteness
 from suite.model import Model, Parameter
 from suite.units import brought
 
@@ -24,10 +26,14 @@ MANY, CALM = 8192, LEVELS[-2]  # samples from which the whole record's fit is a 
 
 
 def residual(problem: Problem, level: Level) -> Array:
-    """Measured minus simulated in noise units, (N, outputs)."""
-    residual = (problem.record.y - level.passed.Y) / np.sqrt(problem.R)
-    wrapped = np.arctan2(np.sin(problem.record.y - level.passed.Y), np.cos(problem.record.y - level.passed.Y))
-    return np.where(problem.angles > 0, wrapped / np.sqrt(problem.R), residual)
+    """Measured minus simulated in noise units, (N, outputs), less what the noise remembers."""
+    return problem.whitened(misfit.residual(problem.model, problem.record, level.passed.Y, np.sqrt(problem.R)))
+
+
+def white(problem: Problem, level: Level, fitted: int = 0) -> float:
+    """Ljung-Box p of what a level leaves; `fitted` numbers cost a lag each."""
+    names = list(problem.model.outputs)
+    return ljung_box(whiteness(problem.record, residual(problem, level), names), problem.count // len(names), fitted)
 
 
 def describe(problem: Problem, hypothesis: Hypothesis) -> list[Named]:

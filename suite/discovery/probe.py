@@ -14,8 +14,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-from suite.discovery.engine import Point, Problem
+from suite.discovery.engine import Problem
 from suite.discovery.fit import Hypothesis
+from suite.discovery.frame import Point
 from suite.discovery.scoring import projected
 from suite.discovery.terms import Term
 from suite.effect import Effect

@@ -14,8 +14,9 @@ from itertools import combinations
 import numpy as np
 import numpy.typing as npt
 
-from suite.discovery.engine import Index, Pass, Point, Problem
+from suite.discovery.engine import Pass, Problem
 from suite.discovery.fit import Hypothesis, Level
+from suite.discovery.frame import Index, Point
 from suite.discovery.library import incompatible
 from suite.discovery.starts import brought
 from suite.discovery.terms import Term

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from suite.discovery import words
-from suite.discovery.engine import Point, Problem
+from suite.discovery.engine import Problem
 from suite.discovery.fit import Hypothesis, levenberg_marquardt
+from suite.discovery.frame import Point
 from suite.discovery.identify import ALARM, Search
 from suite.discovery.result import Verdict
 from suite.discovery.scoring import score

@@ -12,7 +12,8 @@ import numpy.typing as npt
 import sympy
 
 from suite import expressions
-from suite.discovery.engine import Point, Problem
+from suite.discovery.engine import Problem
+from suite.discovery.frame import Point
 from suite.discovery.noise import unrolled
 from suite.discovery.terms import Term
 from suite.errors import DataError

@@ -12,10 +12,9 @@ from suite.discovery.fit import Hypothesis, prepare
 from suite.discovery.identify import ALARM, Search, search
 from suite.discovery.library import candidates
 from suite.discovery.long import LONG, search_long
-from suite.discovery.outcome import curve, describe, errors, idle, parameters, residual
+from suite.discovery.outcome import curve, describe, errors, idle, parameters, white
 from suite.discovery.result import Candidate, Verdict
 from suite.discovery.weighing import Weighed, Weighing, excess, kind, size, weigh
-from suite.discovery.whiteness import ljung_box, whiteness
 from suite.effect import Effect
 from suite.model import Model
 from suite.record import Record
@@ -52,13 +51,12 @@ def judge(found: Search) -> tuple[Verdict, Hypothesis]:
         weighing = weighing.doubted()
     pairs = _plausible(found, weighing, named) if said != "adequate" else []
     names = list(problem.model.outputs)
-    correlations = whiteness(problem.record, problem.whitened(residual(problem, base.exact)), names)
     verdict = Verdict(
         said, "", tuple(describe(problem, named)), weighing.best.weight if named.active else 0.0,
         tuple(candidate for _, candidate in pairs),
         {
             "lambda": float(base.gain), "threshold": ALARM,
-            "ljung_box_p": ljung_box(correlations, problem.count // len(names), len(problem.columns(()))),
+            "ljung_box_p": white(problem, base.exact, len(problem.columns(()))),
         },
         separability.smallest_detectable(found, named), errors(found, named), parameters(problem, named), 0.0,
     )  # fmt: skip

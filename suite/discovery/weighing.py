@@ -14,11 +14,10 @@ from suite.discovery.engine import Problem
 from suite.discovery.fit import Hypothesis, Level
 from suite.discovery.identify import ALARM, Search, left, needs_more
 from suite.discovery.library import triage
-from suite.discovery.outcome import foretold, residual
+from suite.discovery.outcome import foretold, white
 from suite.discovery.patchwork import hollow, patched
 from suite.discovery.probe import hidden_law
 from suite.discovery.result import Kind
-from suite.discovery.whiteness import ljung_box, whiteness
 
 Array = npt.NDArray[np.float64]
 
@@ -190,9 +189,6 @@ def _told(found: Search, best: Hypothesis) -> float:
     if not best.exact.passed.finite:
         return 0.0
     share = min(1.0, 1.0 / max(left(best), 1e-12))
-    names = list(problem.model.outputs)
-    e = problem.whitened(residual(problem, best.exact))
-    white = ljung_box(whiteness(problem.record, e, names), problem.count // len(names), 0) > WHITE
-    if white and hidden_law(problem, best) is None:
+    if white(problem, best.exact) > WHITE and hidden_law(problem, best) is None:
         return share
     return LESS if best.active and foretold(found, best) < PART else min(share, LESS)

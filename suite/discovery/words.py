@@ -45,7 +45,7 @@ def headline(verdict: Verdict) -> str:
         return f"Missing: {names} (weight {weight(verdict.weight)})."
     if verdict.verdict == "ambiguous":
         common = re.search(r"In each of them [^.]*\.", verdict.sentence)
-        return _several(verdict) + (f" {common.group()}" if common else "")
+        return _several(verdict, brief=True) + (f" {common.group()}" if common else "")
     return verdict.sentence
 
 
@@ -53,8 +53,10 @@ def _all(verdict: Verdict) -> str:
     return " and ".join(map(effect, verdict.effects))
 
 
-def _several(verdict: Verdict) -> str:
-    rivals = [" with ".join(named.effect for named in c.effects) + f" ({weight(c.weight)})" for c in verdict.plausible]
+def _several(verdict: Verdict, brief: bool = False) -> str:
+    """The plausible ones with their weights; `brief`: those of a hundredth at least."""
+    told = [c for c in verdict.plausible if c.weight >= 0.01 or not brief] or list(verdict.plausible[:1])
+    rivals = [" with ".join(named.effect for named in c.effects) + f" ({weight(c.weight)})" for c in told]
     more = f" and {len(rivals) - 5} more" if len(rivals) > 5 else ""
     rest = 1.0 - sum(candidate.weight for candidate in verdict.plausible)
     if rest > max(candidate.weight for candidate in verdict.plausible):
