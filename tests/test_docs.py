@@ -17,13 +17,14 @@ BESIDE = re.compile(r"([0-9.]*[0-9])\s\(([A-Z]{3,})\)")
 
 
 def constants() -> dict[str, set[float]]:
-    """Every number that a module of discovery names in capitals."""
+    """Every number, or tuple of numbers, that a module of discovery names in capitals."""
     found: dict[str, set[float]] = {}
     for info in pkgutil.iter_modules(suite.discovery.__path__):
         module = importlib.import_module(f"suite.discovery.{info.name}")
         for name, value in vars(module).items():
-            if name.isupper() and isinstance(value, (int, float)):
-                found.setdefault(name, set()).add(float(value))
+            values = value if isinstance(value, tuple) else (value,)
+            if name.isupper() and all(isinstance(v, (int, float)) for v in values):
+                found.setdefault(name, set()).update(map(float, values))
     return found
 
 
