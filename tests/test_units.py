@@ -153,7 +153,7 @@ BROUGHT = {
     ("harmonic_forcing", "v"): {"a": "m/s^2", "b": "m/s^2", "w": "rad/s"},
     ("bouc_wen_hysteresis", "v"): {"a": "1/s^2", "w": "m", "z": "m"},
     ("hard_stop", "v"): {"a": "1/s^2", "w": "m"},
-    ("power_term", "v"): {"a": None, "w": None},
+    ("power_term", "v"): {"a": "m/s^2", "w": None, "s": "m/s"},
     ("input_delay", "F"): {"a": "s"},
     ("actuator_lag", "F"): {"a": None, "w": "s", "z": "N"},
     ("sensor_bias", "pos"): {"a": "m"},
