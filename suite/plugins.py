@@ -15,8 +15,11 @@ from typing import Any
 from suite.case import Case
 from suite.effect import Effect
 from suite.estimator import Estimator
+from suite.metric import Metric
 
-KINDS = ("estimators", "baselines", "cases", "effects")
+KINDS = ("estimators", "baselines", "cases", "effects", "metrics")
+# Metrics are of the benchmark alone, so their folder is there.
+FOLDERS = {"metrics": "suite.benchmark.measures"}
 
 
 @dataclass(frozen=True)
@@ -29,13 +32,14 @@ class Found:
 
 @cache
 def find(kind: str) -> Found:
-    """All plug-ins of a kind: "estimators" and "baselines" (instances), "cases", "effects"."""
+    """All plug-ins of a kind: "estimators" and "baselines" (instances), "cases", "effects", "metrics"."""
     found = Found()
-    package = importlib.import_module(kind)
+    folder = FOLDERS.get(kind, kind)
+    package = importlib.import_module(folder)
     for file in sorted(info.name for info in pkgutil.iter_modules(package.__path__)):
         # What several plug-ins share has a name with _ and is none itself.
         if not file.startswith("_"):
-            _take(found, f"{kind}.{file}", lambda name=f"{kind}.{file}": importlib.import_module(name))
+            _take(found, f"{folder}.{file}", lambda name=f"{folder}.{file}": importlib.import_module(name))
     for point in sorted(entry_points(group=f"unmodelled.{kind}"), key=lambda point: point.name):
         _take(found, f"{point.value} (entry point {point.name})", point.load)
     return found
@@ -56,6 +60,11 @@ def effects() -> dict[str, Effect]:
     return dict(find("effects").loaded)
 
 
+def metrics() -> dict[str, Metric]:
+    """Every metric of the benchmark that is a plug-in, by name."""
+    return dict(find("metrics").loaded)
+
+
 def _take(found: Found, label: str, load: Any) -> None:
     try:
         items = {item.id if isinstance(item, Effect) else item.name: item for item in _items(load())}
@@ -72,7 +81,7 @@ def _take(found: Found, label: str, load: Any) -> None:
 def _items(thing: Any) -> Iterator[Any]:
     """The plug-ins in a module, or the one that an entry point names."""
     for value in vars(thing).values() if isinstance(thing, ModuleType) else [thing]:
-        if isinstance(value, (Case, Effect)):
+        if isinstance(value, (Case, Effect, Metric)):
             yield value
         elif inspect.isclass(value) and issubclass(value, Estimator) and not inspect.isabstract(value):
             # A class that a module imports from another is that one's plug-in.

@@ -44,15 +44,26 @@ def plugin(estimator: Estimator) -> str:
         if name in seen or module is None:
             continue
         seen.add(name)
-        try:
-            texts.append((name, inspect.getsource(module)))
-        except (OSError, TypeError):
-            texts.append((name, "no source"))
+        texts.append(_source(name))
         for value in list(vars(module).values()):
             used = value.__name__ if isinstance(value, ModuleType) else getattr(value, "__module__", None)
             if isinstance(used, str) and used.startswith(SHARED):
                 todo.append(used)
     return _digest(*sorted(texts))
+
+
+def _source(name: str) -> tuple[str, str]:
+    """A module's name and its source, where there is any."""
+    try:
+        return name, inspect.getsource(sys.modules[name])
+    except (KeyError, OSError, TypeError):
+        return name, "no source"
+
+
+def measures() -> str:
+    """A hash of the modules of the metrics that are plug-ins: a new one is a number that stored rows lack."""
+    names = {getattr(metric.value, "__module__", "") for metric in plugins.metrics().values()}
+    return _digest(*sorted(_source(name) for name in names))
 
 
 # What a row of the recovery benchmark depends on, as files and folders of the packages.
@@ -100,6 +111,7 @@ class Keys:
     def __init__(self, data: Path | None) -> None:
         self.plugin = cache(lambda name: method(name) if name in METHODS else plugin(plugins.estimators()[name]))
         self.case = cache(lambda name: case(plugins.cases()[name], data))
+        self.measures = cache(measures)
 
     def tuning(self, name: str, noise: float, estimator: str) -> str:
         """The key of the tuned values of an estimator on a case at a noise level."""
@@ -109,4 +121,5 @@ class Keys:
         """The key of a cell."""
         tuned = self.tuning(cell.case, cell.noise, cell.estimator) if cell.variant == "tuned" else ""
         versions = (self.plugin(cell.estimator), self.case(cell.case), suite.__version__)
-        return _digest(cell.label, tuned, *versions)
+        judged = () if cell.estimator in METHODS else (self.measures(),)
+        return _digest(cell.label, tuned, *versions, *judged)

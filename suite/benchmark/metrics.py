@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from suite import plugins
+from suite.benchmark.innovations import whitened
 from suite.case import Case, Truth
 from suite.estimator import Estimate
+from suite.metric import Judged
 from suite.model import Model
 from suite.record import Record
 
@@ -41,6 +44,7 @@ def judge(
         row |= {"J": sum(estimate.J), "J_data": estimate.J[0], "J_model": estimate.J[1]}
     if kind == "filter" and estimate.P is not None:
         row["nis"] = nis(model, record, estimate)
+    row |= measured(Judged(case, record, truth, estimate, kind), row)
     if truth is None:
         return row
     error = np.sqrt(np.mean((estimate.x - truth.x) ** 2, axis=0))
@@ -58,6 +62,31 @@ def judge(
     if size > 0.0:
         row["d_nrmse"] = float(gap / size)
     return {**row, **coefficients(case, record, estimate), **named(case, truth, estimate)}
+
+
+# What a row says of itself; a metric of that name would overwrite it.
+TAKEN = {
+    "case", "noise", "estimator", "variant", "seed", "key", "status", "reason", "kind", "tuning", "seconds",
+    "step_us", "steps", "peak_mb", "output_rmse", "report", "metric_errors", "J", "J_data", "J_model", "nis",
+    "nees", "state_rmse", "state_nrmse", "d_rmse", "d_nrmse", "parameters", "parameter_error", "parameter_worst",
+    "named", "named_as", "plugin_hash", "case_hash", "versions", "when",
+}  # fmt: skip
+
+
+def measured(judged: Judged, row: Mapping[str, Any]) -> dict[str, Any]:
+    """The numbers of the metrics that are plug-ins; what one raises goes to `metric_errors` under its name."""
+    found: dict[str, Any] = {}
+    errors: dict[str, str] = {}
+    for name, metric in plugins.metrics().items():
+        try:
+            if name in TAKEN or name in row:
+                raise ValueError(f"the name {name!r} is a field of the row already; choose another")
+            value = metric.value(judged)
+            if value is not None:
+                found[name] = float(value)
+        except Exception as error:  # a plug-in may fail in any way; the row keeps its other numbers
+            errors[name] = f"{type(error).__name__}: {error}"
+    return found | ({"metric_errors": errors} if errors else {})
 
 
 def coefficients(case: Case, record: Record, estimate: Estimate) -> dict[str, Any]:
@@ -126,26 +155,14 @@ def nees(error: Array, P: Array) -> float:
 def nis(model: Model, record: Record, estimate: Estimate) -> float | None:
     """Mean over time of the normalised innovation squared over the outputs; 1 where the filter is consistent.
 
-    From the updated state alone: with r = z - h(x+), R - H P+ H' = R S^-1 R and r = R S^-1 nu, hence
-    r' (R - H P+ H')^-1 r = nu' S^-1 nu. None where it is undefined.
+    None where it is undefined.
     """
-    if record.prior is None or estimate.P is None:
+    e = whitened(model, record, estimate)
+    if e is None:
         return None
-    R = record.prior.R
-    terms = []
-    # The first sample may have given the first state, so it is no innovation.
-    for k in range(1, len(record)):
-        seen = ~np.isnan(record.y[k])
-        if not seen.any():
-            continue
-        r = (record.y[k] - model.output(record.t[k], estimate.x[k], record.u[k]))[seen]
-        H = model.output_jacobian(record.t[k], estimate.x[k], record.u[k])[seen]
-        gap = np.diag(R[seen]) - H @ estimate.P[k] @ H.T
-        # Where the filter follows the measurement exactly (S >> R) the difference is lost in rounding.
-        if np.linalg.eigvalsh(gap / np.max(R[seen]))[0] < 1e-9:
-            continue
-        terms.append(float(r @ np.linalg.solve(gap, r)) / seen.sum())
-    return float(np.mean(terms)) if len(terms) > len(record) // 2 else None
+    seen = np.isfinite(e)
+    rows = seen.any(axis=1)
+    return float(np.mean(np.nansum(e[rows] ** 2, axis=1) / seen[rows].sum(axis=1)))
 
 
 def _output_rmse(model: Model, record: Record, estimate: Estimate) -> dict[str, float]:

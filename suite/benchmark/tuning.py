@@ -4,7 +4,8 @@ The rule (no truth is used): of the record of a tuning seed every fourth sample 
 square of what was taken away minus the estimate's output there, over the output's variance, averaged over the tuning
 seeds. A filter is so judged by its prediction over the gap, a smoother by its interpolation. It needs nothing but the
 estimated states, so it is the same for all. The budget is EVALUATIONS scores: first the default, then a quasi-random
-search of the stated ranges, then steps around the best that shrink.
+search of the stated ranges, then steps around the best that shrink. Every evaluated point is kept with its score, so
+that the sensitivity to each number can be drawn.
 """
 
 from __future__ import annotations
@@ -35,14 +36,19 @@ GAP = 4
 
 
 def tune(case_name: str, noise: float, name: str, data: Path | None) -> dict[str, Any]:
-    """The best values found: {"values": by name, "score", "default_score", "evaluations"}."""
+    """The best values found: {"values": by name, "score", "default_score", "evaluations", "points": each evaluated
+    value by name with its score, null where the method failed there; "case", "noise", "estimator"}.
+    """
     case, estimator = plugins.cases()[case_name], plugins.estimators()[name]
     records = [_with_gaps(case, experiment(case, noise, seed, data)[0], seed % GAP) for seed in SEEDS]
     ranges = list(estimator.tuning.values())
     names = list(estimator.tuning)
+    points: list[dict[str, Any]] = []
 
     def score(values: Mapping[str, float]) -> float:
-        return _score(case, estimator, records, values)
+        reached = _score(case, estimator, records, values)
+        points.append({"values": dict(values), "score": reached if math.isfinite(reached) else None})
+        return reached
 
     default_score = score({})
     best: Array | None = None
@@ -70,7 +76,11 @@ def tune(case_name: str, noise: float, name: str, data: Path | None) -> dict[str
         "values": values,
         "score": best_score if math.isfinite(best_score) else None,
         "default_score": default_score if math.isfinite(default_score) else None,
-        "evaluations": EVALUATIONS,
+        "evaluations": len(points),
+        "points": points,
+        "case": case_name,
+        "noise": noise,
+        "estimator": name,
     }
 
 
