@@ -22,34 +22,64 @@ def with_random_walk(model: Model, record: Record, prior: Prior, q_scale: float)
     to sample. The walk starts from 0 with variance v and has density q_scale SHARE v CHANGES / T, T the record's
     length. The original equations keep no other noise: what they lack, the disturbance holds.
     """
+    variance, pace = _size_and_pace(model, record, prior)
+    walk = q_scale * SHARE * variance * pace
+    return model.with_disturbance(model.suspects), _grown(model, prior, variance, walk)
+
+
+def with_integrated_walk(model: Model, record: Record, prior: Prior, q_scale: float) -> tuple[Model, Prior]:
+    """The model with states d_<name> and d_d_<name> for each suspect, and the prior for all.
+
+    d' = slope, slope' = white noise: an integrated random walk, whose d is smooth. v and T as in `with_random_walk`.
+    A smooth d changes by swinging, CHANGES times over the record: w = 2 pi CHANGES / T. d starts from 0 with variance
+    v, its slope from 0 with variance v w^2. A density q gives d the variance q s^3 / 3 in a time s;
+    q = q_scale 3 SHARE v w^3 makes that SHARE v after 1 / w.
+    """
+    variance, changes = _size_and_pace(model, record, prior)
+    pace = 2.0 * np.pi * changes
+    walk = q_scale * 3.0 * SHARE * variance * pace**3
+    start = np.concatenate([variance, variance * pace**2])
+    driven = model.with_disturbance(model.suspects)
+    sloped = driven.with_disturbance([f"d_{name}" for name in model.suspects])
+    return sloped, _grown(model, prior, start, np.concatenate([np.zeros_like(walk), walk]))
+
+
+def spread_out(model: Model, values: Array, covariance: Array | None = None) -> tuple[Array, Array | None]:
+    """The disturbance states of a grown model (N, n + m or n + 2 m) as d (N, n), and their covariance as (N, n, n).
+
+    Equations that are not suspected have d = 0 with covariance 0.
+    """
+    at = _suspected(model)
+    n, N = len(model.states), len(values)
+    own = slice(n, n + len(at))
+    d = np.zeros((N, n))
+    d[:, at] = values[:, own]
+    if covariance is None:
+        return d, None
+    P_d = np.zeros((N, n, n))
+    P_d[:, at[:, None], at[None, :]] = covariance[:, own, own]
+    return d, P_d
+
+
+def _suspected(model: Model) -> npt.NDArray[np.int64]:
+    """Where the suspects are among the states, (m,)."""
     names = list(model.states)
-    at = np.array([names.index(name) for name in model.suspects], dtype=np.int64)
-    n, m = len(names), len(at)
-    dt = float(np.median(record.dt))
-    variance = prior.Q[at] / dt
-    walk = q_scale * SHARE * variance * CHANGES / float(record.t[-1] - record.t[0])
-    P0 = np.zeros((n + m, n + m))
+    return np.array([names.index(name) for name in model.suspects], dtype=np.int64)
+
+
+def _size_and_pace(model: Model, record: Record, prior: Prior) -> tuple[Array, float]:
+    """The variance v (m,) of the model error of each suspect, and how often it changes by its size in a unit of time."""
+    variance = prior.Q[_suspected(model)] / float(np.median(record.dt))
+    return variance, CHANGES / float(record.t[-1] - record.t[0])
+
+
+def _grown(model: Model, prior: Prior, variance: Array, density: Array) -> Prior:
+    """The prior with further states that start from 0 with `variance` and have process noise of `density`."""
+    n, more = len(model.states), len(variance)
+    P0 = np.zeros((n + more, n + more))
     P0[:n, :n] = prior.P0
     P0[n:, n:] = np.diag(variance)
     # Noise in an equation that the prior lets err but that is no suspect stays.
     Q = prior.Q.copy()
-    Q[at] = 0.0
-    grown = Prior(np.concatenate([prior.x0, np.zeros(m)]), P0, prior.R, np.concatenate([Q, walk]))
-    return model.with_disturbance(model.suspects), grown
-
-
-def spread_out(model: Model, values: Array, covariance: Array | None = None) -> tuple[Array, Array | None]:
-    """The disturbance states of a grown model (N, n + m) as d (N, n), and their covariance as (N, n, n).
-
-    Equations that are not suspected have d = 0 with covariance 0.
-    """
-    names = list(model.states)
-    at = np.array([names.index(name) for name in model.suspects], dtype=np.int64)
-    n, N = len(names), len(values)
-    d = np.zeros((N, n))
-    d[:, at] = values[:, n:]
-    if covariance is None:
-        return d, None
-    P_d = np.zeros((N, n, n))
-    P_d[:, at[:, None], at[None, :]] = covariance[:, n:, n:]
-    return d, P_d
+    Q[_suspected(model)] = 0.0
+    return Prior(np.concatenate([prior.x0, np.zeros(more)]), P0, prior.R, np.concatenate([Q, density]))
