@@ -68,7 +68,7 @@ def _suspected(model: Model) -> npt.NDArray[np.int64]:
 
 
 def _size_and_pace(model: Model, record: Record, prior: Prior) -> tuple[Array, float]:
-    """The variance v (m,) of the model error of each suspect, and how often it changes by its size in a unit of time."""
+    """The variance v (m,) of each suspect's model error, and how often it changes by its size in a unit of time."""
     variance = prior.Q[_suspected(model)] / float(np.median(record.dt))
     return variance, CHANGES / float(record.t[-1] - record.t[0])
 
