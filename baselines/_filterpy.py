@@ -27,10 +27,14 @@ Array = npt.NDArray[np.float64]
 LOST = 1e100
 
 
+class NoFilterError(ValueError):
+    """A filter that is not defined from here on, with the reason in a sentence that "at t = ..." may follow."""
+
+
 @dataclass(frozen=True)
 class Pass:
     """One run of a filter: x (N, n), P (N, n, n), jump (N, n) = x - x_prior, nis (N,) (NaN where nothing was measured),
-    failed_at: None, or the sample at which the filter broke; what follows then repeats the last sound sample.
+    failed_at: None, or the sample at which the filter broke, and why; what follows then repeats the last sound sample.
     """
 
     x: Array
@@ -38,6 +42,7 @@ class Pass:
     jump: Array
     nis: Array
     failed_at: int | None = None
+    why: str = "the filter diverged"
 
     @property
     def mean_nis(self) -> float:
@@ -49,14 +54,45 @@ class Pass:
         status, note = "ok", ""
         if self.failed_at is not None:
             status = "diverged"
-            note = f"the filter diverged at t = {record.t[self.failed_at]:.4g} s; the last estimate is held from there"
+            note = f"{self.why} at t = {record.t[self.failed_at]:.4g} s; the last estimate is held from there"
         return Estimate(x=x, P=P, d=d, P_d=P_d, status=status, note=note, report={"mean NIS": self.mean_nis})
 
 
 Kind = Callable[[Model, Record, Prior], Pass]
+Seen = npt.NDArray[np.bool_]
+Residual = Callable[[Array, Array], Array]
 
 
-class _SteppedEKF(ExtendedKalmanFilter):
+@dataclass(frozen=True)
+class Plant:
+    """A model along a record: what a filter needs of it at sample k, where step k ends."""
+
+    model: Model
+    record: Record
+
+    def dt(self, k: int) -> float:
+        """The length of step k."""
+        return float(self.record.t[k] - self.record.t[k - 1])
+
+    def transition(self, k: int, x: Array) -> tuple[Array, Array]:
+        """The state at sample k from x (n,) at k - 1, and its derivative by x, (n, n)."""
+        t, u = self.record.t, self.record.u
+        return self.model.transition(float(t[k - 1]), x, tuple(u[k - 1]), self.dt(k), tuple(u[k]))
+
+    def step(self, k: int, x: Array) -> Array:
+        """The state at sample k from x (n,) at k - 1."""
+        return self.transition(k, x)[0]
+
+    def output(self, k: int, x: Array) -> Array:
+        """The outputs at sample k, (outputs,)."""
+        return self.model.output(float(self.record.t[k]), x, tuple(self.record.u[k]))
+
+    def output_jacobian(self, k: int, x: Array) -> Array:
+        """Their derivative by x, (outputs, n)."""
+        return self.model.output_jacobian(float(self.record.t[k]), x, tuple(self.record.u[k]))
+
+
+class SteppedEKF(ExtendedKalmanFilter):
     """filterpy's EKF with the plant's own step in place of x <- F x."""
 
     def __init__(self, states: int, outputs: int) -> None:
@@ -69,49 +105,53 @@ class _SteppedEKF(ExtendedKalmanFilter):
 
 def extended(model: Model, record: Record, prior: Prior) -> Pass:
     """Filterpy's ExtendedKalmanFilter over one run, from prior.x0 at the first sample, which is used too."""
-    ekf = _SteppedEKF(len(model.states), len(model.outputs))
+    plant = Plant(model, record)
+    ekf = SteppedEKF(len(model.states), len(model.outputs))
     ekf.x, ekf.P = prior.x0.copy(), prior.P0.copy()
 
-    def predict(k: int, dt: float) -> None:
-        u, u_next = record.u[k - 1], record.u[k]
-        ekf.moved, ekf.F = model.transition(float(record.t[k - 1]), ekf.x, tuple(u), dt, tuple(u_next))
-        ekf.Q = np.diag(prior.Q * dt)
+    def predict(k: int) -> None:
+        ekf.moved, ekf.F = plant.transition(k, ekf.x)
+        ekf.Q = np.diag(prior.Q * plant.dt(k))
         ekf.predict()
 
-    def update(k: int, seen: npt.NDArray[np.bool_], residual: Callable[[Array, Array], Array]) -> None:
-        t, u = float(record.t[k]), tuple(record.u[k])
+    def update(k: int, seen: Seen, residual: Residual) -> float:
         ekf.update(
             record.y[k, seen],
-            lambda x: model.output_jacobian(t, x, u)[seen],
-            lambda x: model.output(t, x, u)[seen],
+            lambda x: plant.output_jacobian(k, x)[seen],
+            lambda x: plant.output(k, x)[seen],
             R=np.diag(prior.R[seen]),
             residual=residual,
         )
+        return float(ekf.y @ ekf.SI @ ekf.y)
 
-    return _run(ekf, model, record, predict, update)
+    return drive(ekf, model, record, predict, update)
 
 
 def unscented(model: Model, record: Record, prior: Prior) -> Pass:
     """Filterpy's UnscentedKalmanFilter over one run (sigma points of Van der Merwe, alpha = 1, beta = 2, kappa = 0)."""
-    # With kappa = 0 and alpha = 1 no weight is negative, so that P stays a covariance.
-    points = MerweScaledSigmaPoints(len(model.states), 1.0, 2.0, 0.0, sqrt_method=_root)
-    ukf = UnscentedKalmanFilter(len(model.states), len(model.outputs), 1.0, hx=None, fx=None, points=points)
+    plant, ukf = Plant(model, record), unscented_filter(model)
     ukf.x, ukf.P = prior.x0.copy(), prior.P0.copy()
     # The first sample is an update without a prediction: its sigma points are drawn here.
-    ukf.sigmas_f = points.sigma_points(ukf.x, ukf.P)
+    ukf.sigmas_f = ukf.points_fn.sigma_points(ukf.x, ukf.P)
 
-    def predict(k: int, dt: float) -> None:
-        t, u, u_next = float(record.t[k - 1]), tuple(record.u[k - 1]), tuple(record.u[k])
-        ukf.Q = np.diag(prior.Q * dt)
-        ukf.predict(dt=dt, fx=lambda x, dt: model.step(t, x, u, dt, u_next))
+    def predict(k: int) -> None:
+        ukf.Q = np.diag(prior.Q * plant.dt(k))
+        ukf.predict(fx=lambda x, dt: plant.step(k, x))
 
-    def update(k: int, seen: npt.NDArray[np.bool_], residual: Callable[[Array, Array], Array]) -> None:
-        t, u = float(record.t[k]), tuple(record.u[k])
+    def update(k: int, seen: Seen, residual: Residual) -> float:
         ukf.residual_z = residual
         ukf.z_mean = lambda sigmas, weights: _mean(sigmas, weights, residual)
-        ukf.update(record.y[k, seen], R=np.diag(prior.R[seen]), hx=lambda x: model.output(t, x, u)[seen])
+        ukf.update(record.y[k, seen], R=np.diag(prior.R[seen]), hx=lambda x: plant.output(k, x)[seen])
+        return float(ukf.y @ ukf.SI @ ukf.y)
 
-    return _run(ukf, model, record, predict, update)
+    return drive(ukf, model, record, predict, update)
+
+
+def unscented_filter(model: Model) -> UnscentedKalmanFilter:
+    """The filter object of `unscented`, without functions of the plant."""
+    # With kappa = 0 and alpha = 1 no weight is negative, so that P stays a covariance.
+    points = MerweScaledSigmaPoints(len(model.states), 1.0, 2.0, 0.0, sqrt_method=root)
+    return UnscentedKalmanFilter(len(model.states), len(model.outputs), 1.0, hx=None, fx=None, points=points)
 
 
 def alone(kind: Kind, model: Model, record: Record, q_scale: float) -> Estimate:
@@ -136,34 +176,65 @@ def with_disturbance(kind: Kind, model: Model, record: Record, q_scale: float) -
     return run.estimate(record, run.x[:, :n], run.P[:, :n, :n], *spread_out(model, run.x, run.P))
 
 
-def _run(
-    kalman: Any, model: Model, record: Record, predict: Callable[[int, float], None], update: Callable[..., None]
+def drive(
+    kalman: Any,
+    model: Model,
+    record: Record,
+    predict: Callable[[int], None],
+    update: Callable[[int, Seen, Residual], float],
+    missed: Callable[[], None] = lambda: None,
 ) -> Pass:
+    """Drive a filter object with x and P over a record. `predict` makes step k; `update` takes the channels seen at
+    sample k and gives their normalised innovation squared; `missed` is called where nothing was measured.
+    """
     N, n = len(record), len(model.states)
     x, P, jump, nis = np.zeros((N, n)), np.zeros((N, n, n)), np.zeros((N, n)), np.full(N, np.nan)
-    angle = model.angles > 0
+    angle, why = model.angles > 0, Pass.why
     for k in range(N):
         seen = ~np.isnan(record.y[k])
         try:
             with np.errstate(all="ignore"):
                 if k > 0:
-                    predict(k, float(record.t[k] - record.t[k - 1]))
-                ahead = kalman.x.copy()
+                    predict(k)
+                ahead = np.ravel(kalman.x).copy()
                 if seen.any():
-                    update(k, seen, _residual(angle[seen]))
-                    nis[k] = float(kalman.y @ kalman.SI @ kalman.y)
+                    nis[k] = update(k, seen, _residual(angle[seen]))
+                else:
+                    missed()
                 broken = not (np.all(np.abs(kalman.x) < LOST) and np.all(np.abs(kalman.P) < LOST))
-        except (np.linalg.LinAlgError, ValueError, OverflowError):
-            broken = True
+        except (np.linalg.LinAlgError, ValueError, OverflowError) as error:
+            broken, why = True, str(error) if isinstance(error, NoFilterError) else why
         if broken:
             x[k:], P[k:] = (x[k - 1], P[k - 1]) if k else (0.0, 0.0)
             nis[k:] = np.nan
-            return Pass(x, P, jump, nis, k)
-        x[k], P[k], jump[k] = kalman.x, kalman.P, kalman.x - ahead
+            return Pass(x, P, jump, nis, k, why)
+        x[k], P[k] = np.ravel(kalman.x), kalman.P
+        jump[k] = x[k] - ahead
     return Pass(x, P, jump, nis)
 
 
-def _residual(angle: npt.NDArray[np.bool_]) -> Callable[[Array, Array], Array]:
+def smoothed_pass(run: Pass, plant: Plant, smooth: Callable[[int], tuple[Array, Array]]) -> Pass:
+    """A filter's run smoothed by `smooth`, which gives x and P of the first samples; jump is x - step(x) along it.
+
+    What follows a failure of the filter is held, as it does.
+    """
+    last = len(run.x) if run.failed_at is None else run.failed_at
+    x, P, jump, failed = run.x.copy(), run.P.copy(), np.zeros_like(run.x), run.failed_at
+    if last > 1:
+        try:
+            with np.errstate(all="ignore"):
+                x[:last], P[:last] = smooth(last)
+                jump[1:last] = [x[k] - plant.step(k, x[k - 1]) for k in range(1, last)]
+            sound = bool(np.all(np.abs(x) < LOST) and np.all(np.abs(P) < LOST) and np.all(np.abs(jump) < LOST))
+        except np.linalg.LinAlgError:
+            sound = False
+        if not sound:
+            return replace(run, failed_at=0 if failed is None else failed)
+        x[last:], P[last:] = x[last - 1], P[last - 1]
+    return Pass(x, 0.5 * (P + P.transpose(0, 2, 1)), jump, run.nis, failed, run.why)
+
+
+def _residual(angle: Seen) -> Residual:
     """Z - h, on [-pi, pi] where it is an angle's."""
 
     def residual(z: Array, h: Array) -> Array:
@@ -173,13 +244,13 @@ def _residual(angle: npt.NDArray[np.bool_]) -> Callable[[Array, Array], Array]:
     return residual
 
 
-def _mean(sigmas: Array, weights: Array, residual: Callable[[Array, Array], Array]) -> Array:
+def _mean(sigmas: Array, weights: Array, residual: Residual) -> Array:
     """The weighted mean, taken around the first sigma point, which also holds for angles."""
     offsets = np.array([residual(point, sigmas[0]) for point in sigmas])
     return np.asarray(sigmas[0] + weights @ offsets)
 
 
-def _root(P: Array) -> Array:
+def root(P: Array) -> Array:
     """U with U' U = P, also for a singular P (known initial states), for which Cholesky's method fails."""
     values, vectors = np.linalg.eigh(0.5 * (P + P.T))
     return np.asarray(np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T)

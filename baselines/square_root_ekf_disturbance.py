@@ -1,0 +1,22 @@
+"""The square-root Kalman filter of filterpy with a random-walk disturbance in the suspected equations."""
+
+from __future__ import annotations
+
+from baselines._filterpy import with_disturbance
+from baselines.square_root_ekf import square_root
+from suite.estimator import Estimate, Estimator
+from suite.model import Model
+from suite.record import Record
+
+
+class SquareRootEKFDisturbance(Estimator):
+    """Square-root extended Kalman filter, filterpy's, with a disturbance for each suspect. Friedland (1969).
+
+    d and P_d are the disturbance states and their covariance; `q_scale` multiplies the density of their walk.
+    """
+
+    name = "square-root-ekf-disturbance"
+    tuning = {"q_scale": (1e-4, 1e4, "log")}
+
+    def estimate(self, model: Model, record: Record, q_scale: float = 1.0) -> Estimate:
+        return with_disturbance(square_root, model, record, q_scale)

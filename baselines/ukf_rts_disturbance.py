@@ -1,0 +1,25 @@
+"""The RTS smoother behind filterpy's unscented Kalman filter with a random-walk disturbance."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+from baselines._filterpy import with_disturbance
+from baselines.ukf_rts import unscented_smoother
+from suite.estimator import Estimate, Estimator
+from suite.model import Model
+from suite.record import Record
+
+
+class UKFSmootherDisturbance(Estimator):
+    """Unscented Kalman filter and RTS smoother, filterpy's, with a disturbance for each suspect. Friedland (1969).
+
+    d and P_d are the disturbance states and their covariance; `q_scale` multiplies the density of their walk.
+    """
+
+    name = "ukf-rts-disturbance"
+    kind: ClassVar[Literal["filter", "smoother"]] = "smoother"
+    tuning = {"q_scale": (1e-4, 1e4, "log")}
+
+    def estimate(self, model: Model, record: Record, q_scale: float = 1.0) -> Estimate:
+        return with_disturbance(unscented_smoother, model, record, q_scale)
