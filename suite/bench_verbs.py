@@ -21,16 +21,24 @@ def add_parser(subparsers: Any) -> None:
     plan = argparse.ArgumentParser(add_help=False)
     plan.add_argument("--plan", default="spine", metavar="NAME|FILE", help="a plan of the package or a TOML file")
     plan.add_argument("--only", metavar="PATTERN", help="cells whose line in `bench list` holds this")
+    plan.add_argument(
+        "--estimators", nargs="+", metavar="NAME", help="instead of the plan's; a grid: 'ekf[q_scale=0.1,1,10]'"
+    )
     plan.add_argument("--seeds", type=_count, metavar="N", help="seeds instead of the plan's")
     plan.add_argument("--data", type=Path, metavar="DIR", help="folder of measured data that are not shipped")
     work = argparse.ArgumentParser(add_help=False)
     work.add_argument("--jobs", type=_count, metavar="N", help="processes, default one a core")
     work.add_argument("--force", action="store_true", help="run again what is stored and unchanged")
+    work.add_argument("--memory", type=_count, metavar="MIB", help="memory of one cell at most, default the plan's")
+    work.add_argument("--dask", metavar="ADDRESS", help="run on the Dask cluster whose scheduler is there")
     out = argparse.ArgumentParser(add_help=False)
     out.add_argument("-o", "--output", type=Path, metavar="DIR", required=True, help="folder to write to")
 
     verbs.add_parser("list", parents=[plan, as_json], help="the plans, and the cells of one")
-    verbs.add_parser("run", parents=[plan, work, store, as_json], help="run the cells that are new or changed")
+    runner = verbs.add_parser("run", parents=[plan, work, store, as_json], help="run the cells that are new or changed")
+    runner.add_argument(
+        "--collect", type=Path, nargs="+", metavar="FILE", help="merge other stores into this one and run nothing"
+    )
     verbs.add_parser("tune", parents=[plan, work, store, as_json], help="only tune, with the same budget for all")
     table = verbs.add_parser("table", parents=[store, as_json], help="the results")
     table.add_argument("--rows", action="store_true", help="every cell instead of medians over seeds")
@@ -72,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
 def _list(args: argparse.Namespace) -> int:
     from suite.benchmark import matrix, plan, table
 
-    cells = matrix.chosen(plan.load(args.plan), args.only, args.seeds, args.data)
+    cells = matrix.chosen(plan.load(args.plan), args.only, args.seeds, args.data, args.estimators)
     if args.json:
         plans = {name: plan.load(name).sentence for name in plan.shipped()}
         print(table.to_json({"plans": plans, "plan": args.plan, "cells": [cell.label for cell in cells]}))
@@ -90,18 +98,16 @@ def _run(args: argparse.Namespace) -> int:
     from suite.benchmark import matrix, plan, table
     from suite.benchmark.store import Store
 
+    if args.bench == "run" and args.collect:
+        return _collect(args)
     chosen = plan.load(args.plan)
-    cells = matrix.chosen(chosen, args.only, args.seeds, args.data)
+    cells = matrix.chosen(chosen, args.only, args.seeds, args.data, args.estimators)
+    how = matrix.Running(
+        jobs=args.jobs, limit=chosen.limit, memory=args.memory or chosen.memory, data=args.data, force=args.force,
+        dask=args.dask,
+    )  # fmt: skip
     with Store(args.store) as store:
-        done = matrix.run(
-            cells,
-            store,
-            jobs=args.jobs,
-            limit=chosen.limit,
-            data=args.data,
-            force=args.force,
-            tune_only=args.bench == "tune",
-        )
+        done = matrix.run(cells, store, how, tune_only=args.bench == "tune")
     if args.json:
         print(table.to_json(done))
     elif args.bench == "tune":
@@ -109,6 +115,18 @@ def _run(args: argparse.Namespace) -> int:
     else:
         counts = ", ".join(f"{count} {status}" for status, count in sorted(done["status"].items())) or "none"
         print(f"{done['cells']} cells: {done['unchanged']} unchanged, {done['run']} run ({counts}); in {args.store}")
+    return 0
+
+
+def _collect(args: argparse.Namespace) -> int:
+    from suite.benchmark import table
+    from suite.benchmark.collect import collect
+    from suite.benchmark.store import Store
+
+    with Store(args.store) as store:
+        taken = collect(store, args.collect)
+    told = f"{taken['cells']} rows and {taken['tunings']} tunings were new or newer; in {args.store}"
+    print(table.to_json({"collected": taken}) if args.json else told)
     return 0
 
 

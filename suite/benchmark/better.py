@@ -22,6 +22,7 @@ from suite import plugins
 from suite.benchmark import pool
 from suite.benchmark.progress import Progress
 from suite.benchmark.table_one import TRUE_A3, measuring, regress
+from suite.benchmark.worker import Failure, Task
 from suite.case import Case
 from suite.estimator import Estimate
 from suite.filtering import filtered
@@ -59,7 +60,7 @@ class Entry:
 def table(seeds: int = 5, noises: Sequence[float] = NOISES, jobs: int | None = None) -> list[Entry]:
     """Every method under every noise and measurement, `seeds` records each, in processes."""
     blocks = [(measured, noise, seed) for measured in MEASURED for noise in noises for seed in range(seeds)]
-    tasks = [pool.Task("suite.benchmark.better:one", block, block) for block in blocks]
+    tasks = [Task("suite.benchmark.better:one", block, block) for block in blocks]
     done: dict[Any, Any] = {}
     with Progress("records", len(tasks)) as progress:
         for task, outcome in pool.run(tasks, jobs or os.cpu_count() or 1, 600.0):
@@ -90,7 +91,7 @@ def one(measured: tuple[str, ...], noise: float, seed: int) -> dict[str, float |
 def _entry(method: str, measured: tuple[str, ...], noise: float, runs: Sequence[Any]) -> Entry:
     """A method's values over the runs; the first failure takes their place."""
     for run in runs:
-        reason = run.reason if isinstance(run, pool.Failure) else run[method]
+        reason = run.reason if isinstance(run, Failure) else run[method]
         if isinstance(reason, str):
             return Entry(method, measured, noise, (), reason)
     return Entry(method, measured, noise, tuple(run[method] for run in runs))

@@ -5,9 +5,11 @@ from __future__ import annotations
 import contextlib
 import fnmatch
 import os
+import time
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -17,20 +19,28 @@ import numpy as np
 
 import suite
 from suite import plugins
-from suite.benchmark import pool, tuning
+from suite.benchmark import cluster, grids, pool, tuning
 from suite.benchmark.cells import Cell
 from suite.benchmark.hashes import Keys
 from suite.benchmark.plan import Plan
 from suite.benchmark.progress import Progress
 from suite.benchmark.recovery import recovers
+from suite.benchmark.reservations import Reservations, offered
 from suite.benchmark.store import Store
+from suite.benchmark.worker import MEMORY, Failure, Task
 from suite.errors import DataError, InputError
 
 
-def chosen(plan: Plan, only: str | None, seeds: int | None, data: Path | None) -> list[Cell]:
-    """The cells of a plan whose label holds `only` (shell patterns match the whole label)."""
+def chosen(
+    plan: Plan, only: str | None, seeds: int | None, data: Path | None, estimators: Sequence[str] | None = None
+) -> list[Cell]:
+    """The cells of a plan whose label holds `only` (shell patterns match the whole label); `estimators` and `seeds`
+    take the place of the plan's.
+    """
     if seeds is not None:
         plan = replace(plan, seeds=seeds)
+    if estimators:
+        plan = replace(plan, estimators=tuple(estimators))
     cells = plan.cells(_runs(data))
     if only is not None:
         pattern = only if any(sign in only for sign in "*?[") else f"*{only}*"
@@ -54,78 +64,94 @@ def _runs(data: Path | None) -> dict[str, int]:
     return runs
 
 
-def run(
-    cells: Sequence[Cell],
-    store: Store,
-    *,
-    jobs: int | None = None,
-    limit: float = 60.0,
-    data: Path | None = None,
-    force: bool = False,
-    tune_only: bool = False,
-    quiet: bool = False,
-) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Running:
+    """How cells are run: `jobs` processes here or the Dask cluster at an address; `limit` in seconds and `memory` in
+    MiB are of one cell; `force` runs again what is stored.
+    """
+
+    jobs: int | None = None
+    limit: float = 60.0
+    memory: float = MEMORY
+    data: Path | None = None
+    force: bool = False
+    quiet: bool = False
+    dask: str | None = None
+
+    def results(self, tasks: Iterator[Task | None], limit: float) -> Iterator[tuple[Task, Any]]:
+        """Each task with its result or Failure, as they finish."""
+        if self.dask is None:
+            return pool.run(tasks, self.jobs or max(1, os.cpu_count() or 1), limit, self.memory)
+        return cluster.run(tasks, self.dask, limit, self.memory)
+
+
+def run(cells: Sequence[Cell], store: Store, how: Running, *, tune_only: bool = False) -> dict[str, Any]:
     """Run what is not in the store yet (or all, with `force`); counts by status, and how many were still good."""
-    keys = Keys(data)
-    stored = {} if force else store.keys()
+    keys, since = Keys(how.data), time.time() if how.force else 0.0
+    stored = {} if how.force else store.keys()
     fresh = [cell for cell in cells if tune_only or stored.get(cell) != keys.cell(cell)]
-    jobs = jobs or max(1, os.cpu_count() or 1)
-    # Several estimates a score make a tuning long; it gets the time of as many cells.
-    tuned = _tune(fresh, store, keys, jobs, limit * 2 * tuning.EVALUATIONS, data, force=force, quiet=quiet)
-    if tune_only:
-        return {"tuned": len(tuned)}
-    statuses: Counter[str] = Counter()
-    # Cells of one case and estimator follow each other, so that a process warms up once for many.
-    fresh.sort(key=lambda cell: (cell.case, cell.estimator, cell.noise, cell.variant, cell.seed))
-    tasks = []
-    for cell in fresh:
-        values = tuned[keys.tuning(cell.case, cell.noise, cell.estimator)] if cell.variant == "tuned" else {}
-        module = "recovery" if recovers(cell) else "cells"
-        tasks.append(pool.Task(f"suite.benchmark.{module}:run", (cell, values, data), cell))
-    versions = _versions()
-    with Progress("cells", len(tasks), quiet=quiet) as progress:
-        for task, outcome in pool.run(tasks, jobs, limit):
-            cell, row = task.label, outcome
-            if isinstance(outcome, pool.Failure):
-                row = {"status": "time-out" if outcome.status == "time-out" else "error", "reason": outcome.reason}
-                row |= {"kind": "recovery"} if recovers(cell) else {}
-            hashes = {"plugin_hash": keys.plugin(cell.estimator), "case_hash": keys.case(cell.case)}
-            store.put(cell, keys.cell(cell), {**row, **hashes, "versions": versions})
-            statuses[row["status"]] += 1
-            progress.step(cell.label)
-    return {"cells": len(cells), "run": len(tasks), "unchanged": len(cells) - len(tasks), "status": dict(statuses)}
+    with Reservations(store) as held:
+        tuned = _tune(fresh, store, keys, how, held, since)
+        if tune_only:
+            return {"tuned": tuned}
+        # Cells of one case and estimator follow each other, so that a process warms up once for many.
+        fresh.sort(key=lambda cell: (cell.case, cell.estimator, cell.noise, cell.variant, cell.seed))
+
+        def task(cell: Cell) -> Task | None:
+            if store.key(cell, since) == keys.cell(cell):
+                return None
+            values: Mapping[str, Any] = grids.values(cell.variant)
+            if cell.variant == "tuned":
+                found = store.tuning(keys.tuning(cell.case, cell.noise, cell.estimator))
+                values = found["values"] if found else {}
+            module = "recovery" if recovers(cell) else "cells"
+            return Task(f"suite.benchmark.{module}:run", (cell, values, how.data), cell)
+
+        work = ((keys.cell(cell), partial(task, cell)) for cell in fresh)
+        statuses: Counter[str] = Counter()
+        versions = _versions()
+        with Progress("cells", len(fresh), quiet=how.quiet) as progress:
+            for done, outcome in how.results(offered(work, held), how.limit):
+                cell, row = done.label, outcome
+                if isinstance(outcome, Failure):
+                    row = {"status": outcome.status, "reason": outcome.reason}
+                    row |= {"kind": "recovery"} if recovers(cell) else {}
+                hashes = {"plugin_hash": keys.plugin(cell.estimator), "case_hash": keys.case(cell.case)}
+                with store.transaction():
+                    store.put(cell, keys.cell(cell), {**row, **hashes, "versions": versions})
+                    held.give_back(keys.cell(cell))
+                statuses[row["status"]] += 1
+                progress.step(cell.label)
+    count = statuses.total()
+    return {"cells": len(cells), "run": count, "unchanged": len(cells) - count, "status": dict(statuses)}
 
 
-def _tune(
-    cells: Sequence[Cell],
-    store: Store,
-    keys: Keys,
-    jobs: int,
-    limit: float,
-    data: Path | None,
-    *,
-    force: bool,
-    quiet: bool,
-) -> dict[str, dict[str, float]]:
-    """Tuned values by tuning key, from the store or found now; {} (the defaults) where tuning failed."""
-    wanted = {(c.case, c.noise, c.estimator): None for c in cells if c.variant == "tuned"}
+def _tune(cells: Sequence[Cell], store: Store, keys: Keys, how: Running, held: Reservations, since: float) -> int:
+    """Find the tuned values that are not stored; where tuning failed they are {}, the defaults. How many are wanted."""
+    wanted = dict.fromkeys((c.case, c.noise, c.estimator) for c in cells if c.variant == "tuned")
     by_key = {keys.tuning(*entry): entry for entry in wanted}
-    found: dict[str, dict[str, float]] = {}
-    tasks = []
-    for key, entry in by_key.items():
-        known = None if force else store.tuning(key)
-        if known is None:
-            tasks.append(pool.Task("suite.benchmark.tuning:tune", (*entry, data), key))
-        else:
-            found[key] = known["values"]
-    with Progress("tunings", len(tasks), quiet=quiet) as progress:
-        for task, outcome in pool.run(tasks, jobs, limit):
-            if isinstance(outcome, pool.Failure):
-                outcome = {"values": {}, "failure": outcome.reason}
-            store.put_tuning(task.label, outcome)
-            found[task.label] = outcome["values"]
-            progress.step(f"{by_key[task.label][0]} {by_key[task.label][2]}")
-    return found
+    fresh = {key: entry for key, entry in by_key.items() if store.tuning(key, since) is None}
+
+    def task(key: str, entry: tuple[str, float, str]) -> Task | None:
+        if store.tuning(key, since) is not None:
+            return None
+        return Task("suite.benchmark.tuning:tune", (*entry, how.data), key)
+
+    work = ((key, partial(task, key, entry)) for key, entry in fresh.items())
+    # Several estimates a score make a tuning long; it gets the time of as many cells.
+    limit = how.limit * len(tuning.SEEDS) * tuning.EVALUATIONS
+    with Progress("tunings", len(fresh), quiet=how.quiet) as progress:
+        for done, outcome in how.results(offered(work, held), limit):
+            case, noise, name = fresh[done.label]
+            if isinstance(outcome, Failure):
+                outcome = {
+                    "values": {}, "failure": outcome.reason, "case": case, "noise": noise, "estimator": name
+                }  # fmt: skip
+            with store.transaction():
+                store.put_tuning(done.label, outcome)
+                held.give_back(done.label)
+            progress.step(f"{case} {name}")
+    return len(by_key)
 
 
 def _versions() -> dict[str, str]:

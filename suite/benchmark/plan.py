@@ -11,9 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from suite import plugins
+from suite.benchmark import grids
 from suite.benchmark.cells import Cell
 from suite.benchmark.conditions import CONDITIONS, inapplicable
 from suite.benchmark.recovery import OURS, RIVALS
+from suite.benchmark.worker import MEMORY
 from suite.case import Case
 from suite.errors import InputError
 
@@ -26,7 +28,8 @@ KINDS = ("estimation", "recovery")
 class Plan:
     """Patterns of names (shell style) and what they are crossed with; `noises` empty: those that each case states.
 
-    `seeds` counts the judged seeds 0..seeds-1 of simulated cases; `limit` is the time-out of one cell in seconds.
+    `seeds` counts the judged seeds 0..seeds-1 of simulated cases; `limit` is the time-out of one cell in seconds,
+    `memory` what it may take in MiB. An entry of `estimators` may be a grid, `ekf[q_scale=0.1,1,10]` (see grids).
     `exclude` are patterns of cases left out; with `tags` a case must have one of them; `most_states` bounds its size.
 
     Kind "estimation" judges estimates of states and model error. Kind "recovery" judges whether a method names what is
@@ -42,6 +45,7 @@ class Plan:
     noises: tuple[float, ...] = ()
     seeds: int = 20
     limit: float = 60.0
+    memory: float = MEMORY
     kind: str = "estimation"
     exclude: tuple[str, ...] = ()
     tags: tuple[str, ...] = ()
@@ -54,12 +58,13 @@ class Plan:
         if self.kind == "recovery":
             return self._recovery_cells()
         estimators = plugins.estimators()
+        picked = grids.chosen(self.estimators, estimators)
         cells = []
         for case in self.chosen_cases():
             measured = case.truth is None
             for noise in (0.0,) if measured else self.noises or case.noises:
-                for name in _chosen(self.estimators, estimators, "estimator"):
-                    for variant in self.variants:
+                for name, points in picked.items():
+                    for variant in (*(self.variants if "" in points else ()), *filter(None, points)):
                         if variant == "tuned" and (measured or not estimators[name].tuning):
                             continue
                         count = (runs or {}).get(case.name, 1) if measured else self.seeds
@@ -127,6 +132,7 @@ def parse(table: dict[str, Any], name: str, source: str) -> Plan:
         "noises": (list, "a list of fractions"),
         "seeds": (int, "a whole number"),
         "limit": ((int, float), "seconds"),
+        "memory": ((int, float), "MiB"),
         "kind": (str, "estimation or recovery"),
         "exclude": (list, "a list of names"),
         "tags": (list, "a list of tags"),
@@ -154,8 +160,9 @@ def parse(table: dict[str, Any], name: str, source: str) -> Plan:
         name in (*CONDITIONS, OURS, *RIVALS) and isinstance(count, int) and count > 0 for name, count in counts.items()
     ):
         raise InputError(f"{source}: seeds_of = {counts!r}; expected whole numbers by condition or method")
-    if table.get("seeds", 1) < 1 or table.get("limit", 1) <= 0 or min(table.get("noises", [0])) < 0:
-        raise InputError(f"{source}: seeds and limit must be positive, noises not negative; mend the plan")
+    positive = table.get("seeds", 1) >= 1 and min(table.get("limit", 1), table.get("memory", 1)) > 0
+    if not positive or min(table.get("noises", [0]), default=0) < 0:
+        raise InputError(f"{source}: seeds, limit and memory must be positive, noises not negative; mend the plan")
     if recovery:
         table = {"variants": list(CONDITIONS), **table}
     grown: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}

@@ -1,125 +1,105 @@
-"""Worker processes with time-outs that hold: a task that hangs or crashes costs its process, never the run."""
+"""Worker processes with limits that hold: a task that hangs, crashes or eats memory never stops the run."""
 
 from __future__ import annotations
 
-import contextlib
-import importlib
-import multiprocessing
-import os
-import threading
 import time
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
-from multiprocessing.connection import Connection, wait
+from multiprocessing.connection import wait
 from typing import Any
 
-# A process has this long to start: it imports the numerics and may compile the kernels.
-START = 300.0
+from suite.benchmark.worker import MEMORY, RUNNING, WATCH, Failure, Task, Worker
+from suite.errors import InputError
+
+# So many processes in a row that die before they are ready mean that none will.
+HOPELESS = 5
 
 
-@dataclass(frozen=True)
-class Task:
-    """A call in a worker: "module:function" with arguments that can be pickled, and what the caller knows it by."""
+def run(tasks: Iterable[Task | None], jobs: int, limit: float, memory: float = MEMORY) -> Iterator[tuple[Task, Any]]:
+    """Each task with its result or Failure, as they finish; `limit` in seconds and `memory` in MiB are of one task.
 
-    function: str
-    arguments: tuple[Any, ...]
-    label: Any = None
-
-
-@dataclass(frozen=True)
-class Failure:
-    """What stands in for a result: status "time-out" or "error", and the reason in a sentence."""
-
-    status: str
-    reason: str
-
-
-class _Worker:
-    """One process, its pipe, the task it has and when that must be done."""
-
-    def __init__(self) -> None:
-        context = multiprocessing.get_context("spawn")
-        self.pipe, far = context.Pipe()
-        self.process = context.Process(target=_serve, args=(far,), daemon=True)
-        self.process.start()
-        far.close()
-        self.task: Task | None = None
-        self.ready = False
-        self.deadline = time.monotonic() + START
-
-    def give(self, task: Task, limit: float) -> None:
-        self.task, self.deadline = task, time.monotonic() + limit
-        self.pipe.send((task.function, task.arguments))
-
-    def end(self) -> None:
-        self.process.kill()
-        self.process.join()
-        self.pipe.close()
-
-
-def _serve(pipe: Connection) -> None:
-    """The life of a worker: import, say so, then answer tasks until the pipe closes."""
-    threading.Thread(target=_die_with_parent, daemon=True).start()
-    # An interrupt at the keyboard is the parent's to handle; it ends its workers.
-    with contextlib.suppress(KeyboardInterrupt, EOFError, BrokenPipeError):
-        importlib.import_module("suite.benchmark.cells")
-        pipe.send(None)
-        while True:
-            function, arguments = pipe.recv()
-            module, name = function.split(":")
-            try:
-                result = getattr(importlib.import_module(module), name)(*arguments)
-            except Exception as error:  # the parent turns it into a row
-                result = Failure("error", f"{type(error).__name__}: {error}")
-            pipe.send(result)
-
-
-def _die_with_parent() -> None:
-    """A worker whose parent was killed must not go on computing."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        wait([parent.sentinel])
-        os._exit(1)
-
-
-def run(tasks: Iterable[Task], jobs: int, limit: float) -> Iterator[tuple[Task, Any]]:
-    """Each task with its result or Failure, as they finish; `limit` is the time-out of one task in seconds."""
-    todo = list(tasks)[::-1]
-    workers = [_Worker() for _ in range(min(jobs, len(todo)))]
+    Tasks are drawn when a worker is free for them; None among them means that there is none now, but there may be.
+    """
+    source = iter(tasks)
+    workers: list[Worker] = []
+    again: list[Task] = []
+    more, stillborn = True, 0
     try:
-        while todo or any(worker.task for worker in workers):
-            for worker in workers:
-                if worker.ready and worker.task is None and todo:
-                    worker.give(todo.pop(), limit)
-            busy = [worker for worker in workers if worker.task is not None or not worker.ready]
-            patience = max(0.0, min(worker.deadline for worker in busy) - time.monotonic())
-            answered = set(wait([worker.pipe for worker in busy], timeout=patience))
+        while True:
+            idle = [worker for worker in workers if worker.task is None]
+            while (more or again) and (idle or len(workers) < jobs):
+                task = again.pop() if again else next(source, _END)
+                more = more and task is not _END
+                if task is None or task is _END:
+                    break
+                if not idle:
+                    workers.append(Worker(limit, memory))
+                worker = idle.pop() if idle else workers[-1]
+                if not worker.give(task):
+                    again.append(task)
+                    _bury(worker, workers)
+                    # It was killed at rest, or cannot start.
+                    stillborn += not worker.ready
+                    _hope(stillborn)
+            busy = [worker for worker in workers if worker.task is not None]
+            if not busy and not more and not again:
+                return
+            if not busy:
+                time.sleep(WATCH)
+            answered = set(wait([worker.pipe for worker in busy], timeout=WATCH)) if busy else set()
             for worker in busy:
-                if worker.pipe in answered:
-                    outcome = _receive(worker)
-                elif time.monotonic() >= worker.deadline:
-                    outcome = Failure("time-out", f"not done after {limit:g} s")
-                else:
+                outcome = worker.look(worker.pipe in answered)
+                stillborn = 0 if worker.ready else stillborn
+                if outcome is RUNNING:
                     continue
                 task, worker.task = worker.task, None
-                if (isinstance(outcome, Failure) and outcome.status != "error") or not worker.process.is_alive():
-                    worker.end()
-                    workers[workers.index(worker)] = _Worker()
-                    if task is None:
-                        raise RuntimeError(f"a worker process could not start: {outcome}")
-                if task is None:
-                    worker.ready = True
-                else:
+                assert task is not None
+                if not worker.sound:
+                    _bury(worker, workers)
+                if worker.ready:
                     yield task, outcome
+                else:
+                    again.append(task)
+                    stillborn += 1
+                    _hope(stillborn, outcome)
     finally:
         for worker in workers:
             worker.end()
 
 
-def _receive(worker: _Worker) -> Any:
-    """The answer of a worker, or a Failure where it died."""
-    try:
-        return worker.pipe.recv()
-    except (EOFError, OSError):
-        worker.process.join()
-        return Failure("died", f"the process ended with code {worker.process.exitcode}")
+class Hand:
+    """One process that answers one task after the other, kept between them."""
+
+    def __init__(self) -> None:
+        self.worker: Worker | None = None
+
+    def answer(self, task: Task, limit: float, memory: float) -> Any:
+        """The task's result or Failure."""
+        outcome: Any = None
+        for _ in range(HOPELESS):
+            worker = self.worker = self.worker or Worker(limit, memory)
+            worker.limit, worker.memory = limit, memory
+            given, outcome = worker.give(task), RUNNING
+            while given and outcome is RUNNING:
+                outcome = worker.look(bool(wait([worker.pipe], timeout=WATCH)))
+            worker.task = None
+            if not (given and worker.sound):
+                worker.end()
+                self.worker = None
+            if given and worker.ready:
+                return outcome
+        _hope(HOPELESS, outcome)
+        raise AssertionError
+
+
+_END: Any = object()
+
+
+def _bury(worker: Worker, workers: list[Worker]) -> None:
+    worker.end()
+    workers.remove(worker)
+
+
+def _hope(stillborn: int, outcome: Any = None) -> None:
+    if stillborn >= HOPELESS:
+        said = outcome.reason if isinstance(outcome, Failure) else "they end at once"
+        raise InputError(f"no worker process can start ({said}); is there memory for them? see --memory and --jobs")

@@ -1,0 +1,153 @@
+"""The same tasks on an existing Dask cluster (Slurm, Kubernetes, cloud by dask-jobqueue and friends).
+
+Each thread of a Dask worker runs its tasks in a process of its own, so that the limits of a cell hold there as here. A
+lost Dask worker's tasks run again on another, by Dask; one that is lost with its worker again and again is an error.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import multiprocessing
+import sys
+import threading
+import time
+import uuid
+from collections.abc import Iterable, Iterator
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import suite
+from suite.benchmark import pool
+from suite.benchmark.worker import WATCH, Failure, Task
+from suite.errors import InputError
+
+# Tasks sent per thread of the cluster: one to run and one to follow it at once.
+AHEAD = 2
+CONNECT = 30.0
+PACKAGES = ("suite", "estimators", "baselines", "cases", "effects")
+
+
+def run(tasks: Iterable[Task | None], address: str, limit: float, memory: float) -> Iterator[tuple[Task, Any]]:
+    """Each task with its result or Failure, as they finish, from the cluster whose scheduler is at the address.
+
+    InputError where it cannot be reached, is lost, or has another version of something that results depend on.
+    """
+    try:
+        from distributed import Client
+    except ImportError:
+        raise InputError("--dask needs the package distributed; install unmodelled[dask]") from None
+    try:
+        client = Client(address, timeout=CONNECT, set_as_default=False)
+    except (OSError, ValueError, RuntimeError) as error:
+        raise InputError(f"no Dask scheduler answers at {address} ({error}); start one, or mend --dask") from None
+    with client:
+        _check(client, address)
+        yield from _results(client, address, tasks, limit, memory)
+
+
+def _check(client: Any, address: str) -> None:
+    """Refuse a cluster that would not compute what this process does."""
+    try:
+        found = client.run(fingerprint)
+    except Exception as error:
+        raise InputError(
+            f"a Dask worker at {address} cannot run unmodelled ({type(error).__name__}: {error}); install it there"
+        ) from None
+    if not found:
+        raise InputError(f"the Dask cluster at {address} has no worker; start one")
+    ours = fingerprint()
+    for name, theirs in sorted(found.items()):
+        _refuse(name, theirs, ours)
+
+
+def _refuse(worker: str, theirs: dict[str, str], ours: dict[str, str]) -> None:
+    other = [f"{name} {theirs[name]} instead of {ours[name]}" for name in ours if theirs.get(name) != ours[name]]
+    if other:
+        raise InputError(f"Dask worker {worker} has {', '.join(other)}; install the same there")
+
+
+def _results(
+    client: Any, address: str, tasks: Iterable[Task | None], limit: float, memory: float
+) -> Iterator[tuple[Task, Any]]:
+    """Keep every thread of the cluster, as large as it is now, supplied; hand over what is finished."""
+    from distributed import wait
+
+    source, ours, run_name = iter(tasks), fingerprint(), uuid.uuid4().hex[:8]
+    sent: dict[Any, Task] = {}
+    more, count = True, 0
+    try:
+        while more or sent:
+            threads = max(1, sum(client.nthreads().values())) if more else 0
+            while more and len(sent) < AHEAD * threads:
+                task = next(source, _END)
+                more = task is not _END
+                if task is None or task is _END:
+                    break
+                count += 1
+                key = f"cell-{run_name}-{count}"
+                sent[client.submit(answer, task, limit, memory, ours, key=key, pure=False)] = task
+            if not sent:
+                time.sleep(WATCH)
+                continue
+            try:
+                done = wait(list(sent), timeout=WATCH if more else None, return_when="FIRST_COMPLETED").done
+            except TimeoutError:
+                continue
+            for future in done:
+                task = sent.pop(future)
+                yield task, _outcome(future, address)
+                future.release()
+    finally:
+        with contextlib.suppress(Exception):
+            client.cancel(list(sent), force=True)
+
+
+_END: Any = object()
+
+
+def _outcome(future: Any, address: str) -> Any:
+    """A task's result; a Failure where it took its workers with it."""
+    from distributed import KilledWorker
+
+    if future.status == "cancelled" or future.status == "lost":
+        raise InputError(f"the Dask cluster at {address} is lost; what was finished is kept, run again to go on")
+    error = future.exception()
+    if isinstance(error, KilledWorker):
+        return Failure("error", "every Dask worker that ran it was lost, until Dask gave up")
+    if isinstance(error, InputError):
+        raise error
+    if error is not None:
+        return Failure("error", f"{type(error).__name__}: {error}")
+    return future.result()
+
+
+_own = threading.local()
+
+
+def answer(task: Task, limit: float, memory: float, expected: dict[str, str]) -> Any:
+    """In a thread of a Dask worker: the task's result from a process of this thread's own."""
+    if fingerprint() != expected:  # a worker that has joined since the start
+        from distributed import get_worker
+
+        _refuse(get_worker().address, fingerprint(), expected)
+    # Dask marks its workers as daemons, which may have no children since these would outlive them; ours end with them.
+    config: dict[str, Any] = vars(multiprocessing.current_process()).get("_config", {})
+    config["daemon"] = False
+    if getattr(_own, "hand", None) is None:
+        _own.hand = pool.Hand()
+    return _own.hand.answer(task, limit, memory)
+
+
+@cache
+def fingerprint() -> dict[str, str]:
+    """What results depend on, by name: versions, and a hash of the source of the package's own files."""
+    root = Path(suite.__file__).parent.parent
+    digest = hashlib.sha256()
+    for path in sorted(path for package in PACKAGES for path in (root / package).rglob("*.py")):
+        digest.update(str(path.relative_to(root)).encode() + path.read_bytes())
+    packages = {name: version(name) for name in ("numpy", "scipy", "numba", "filterpy", "distributed")}
+    python = ".".join(map(str, sys.version_info[:2]))
+    return {"unmodelled": f"{suite.__version__} (source {digest.hexdigest()[:8]})", "python": python, **packages}
