@@ -27,7 +27,7 @@ def seeded(seed: int) -> Iterator[None]:
         np.random.set_state(before)
 
 
-def ensemble(model: Model, record: Record, prior: Prior, members: int = 50, inflation: float = 1.0) -> Pass:
+def ensemble(model: Model, record: Record, prior: Prior, members: int = 30, inflation: float = 1.0) -> Pass:
     """Filterpy's EnsembleKalmanFilter (perturbed observations) over one run, from prior.x0 at the first sample.
 
     `inflation` multiplies the members' distances from their mean after each update. The draws are fixed by the
@@ -44,15 +44,17 @@ def ensemble(model: Model, record: Record, prior: Prior, members: int = 50, infl
         def update(k: int, seen: Seen, residual: Residual) -> float:
             # The outputs are counted from the one at the mean, so that angles do not jump between the members.
             middle = plant.output(k, enkf.x)[seen]
+            read: list[Array] = []
 
             def hx(x: Array) -> Array:
-                return middle + residual(plant.output(k, x)[seen], middle)
+                read.append(middle + residual(plant.output(k, x)[seen], middle))
+                return read[-1]
 
             # The perturbations have as many channels as are seen.
             enkf.hx, enkf._mean_z = hx, np.zeros(int(seen.sum()))
             z = middle + residual(record.y[k, seen], middle)
-            y = z - np.mean([hx(member) for member in enkf.sigmas], axis=0)
             enkf.update(z, R=np.diag(prior.R[seen]))
+            y = z - np.mean(read, axis=0)
             if inflation != 1.0:
                 enkf.sigmas = enkf.x + inflation * (enkf.sigmas - enkf.x)
                 enkf.P = inflation**2 * enkf.P
@@ -62,7 +64,7 @@ def ensemble(model: Model, record: Record, prior: Prior, members: int = 50, infl
 
 
 class EnKF(Estimator):
-    """Ensemble Kalman filter with 50 members and perturbed observations, filterpy's. Evensen (1994), Burgers (1998).
+    """Ensemble Kalman filter with 30 members and perturbed observations, filterpy's. Evensen (1994), Burgers (1998).
 
     Process noise is q_scale Q dt a step, Q the prior's density; d is the jump of each sample as a rate (see `alone`).
     """

@@ -93,7 +93,7 @@ class Case:
         t: Array = np.arange(round(experiment.duration / experiment.dt) + 1, dtype=np.float64) * experiment.dt
         u = np.array([[experiment.inputs[name](time) for name in self.deficient.inputs] for time in t])
         u = u.reshape(len(t), len(self.deficient.inputs))
-        x, d, clean = self._run(t, u)
+        x, d, clean = self.run(t, u)
         spread = noise * clean.std(axis=0)
         y = clean + spread * np.random.default_rng(seed).standard_normal(clean.shape)
         for name, k in experiment.every.items():
@@ -101,16 +101,16 @@ class Case:
             unseen[0] = True
             y[unseen, list(self.deficient.outputs).index(name)] = np.nan
         record = Record(t, u, y, names=tuple(self.deficient.outputs), source=self.name)
-        return record, Truth(np.ascontiguousarray(x[:, self._shared]), d, spread)
+        return record, Truth(np.ascontiguousarray(x[:, self.shared]), d, spread)
 
     @property
-    def _shared(self) -> npt.NDArray[np.int64]:
+    def shared(self) -> npt.NDArray[np.int64]:
         """Where the deficient model's states stand among the truth's."""
         assert self.truth is not None
         places = {name: i for i, name in enumerate(self.truth.states)}
         return np.array([places[name] for name in self.deficient.states], dtype=np.int64)
 
-    def _run(self, t: Array, u: Array) -> tuple[Array, Array, Array]:
+    def run(self, t: Array, u: Array) -> tuple[Array, Array, Array]:
         """All states of the plant, (N, n), the model error, (N, m), and the noise-free outputs at the samples.
 
         The plant is integrated 20 times finer.
@@ -129,7 +129,7 @@ class Case:
         part = plant_workspace(m, inputs, len(self.deficient.parameters))
         slopes = np.zeros((Y.shape[1], n)), np.zeros((Y.shape[1], len(self.truth.parameters)))
         held, linear, sensors = int(self.held), mover.linear_inputs, self.truth.program.output
-        trajectory(sensors, *pairs, held, self._shared, t, u, linear, none, X, D, Y, *slopes, work, part)
+        trajectory(sensors, *pairs, held, self.shared, t, u, linear, none, X, D, Y, *slopes, work, part)
         return X, D, Y
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from suite import plugins
-from suite.benchmark import metrics
+from suite.benchmark import metrics, references
 from suite.case import Case, Truth
 from suite.errors import DataError
 from suite.estimator import Estimator
@@ -65,12 +65,15 @@ def sensor_noise(case: Case, record: Record) -> Array:
 
 def run(cell: Cell, tuned: Mapping[str, float], data: Path | None) -> dict[str, Any]:
     """The row of a cell: whatever the estimator does, there is a row with a status and a reason in words."""
-    case, estimator = plugins.cases()[cell.case], plugins.estimators()[cell.estimator]
+    case, reference = plugins.cases()[cell.case], cell.estimator in references.REFERENCES
     row: dict[str, Any] = {"status": "ok", "reason": "", "tuning": dict(tuned)}
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
         try:
             record, truth = experiment(case, cell.noise, cell.seed, data)
+            if reference:
+                return {**row, "steps": len(record), **references.row(cell.estimator, case, record, truth)}
+            estimator = plugins.estimators()[cell.estimator]
             reason = estimator.skip(case.deficient, record)
             if reason is not None:
                 return {**row, "status": "skipped", "reason": reason}
@@ -82,7 +85,8 @@ def run(cell: Cell, tuned: Mapping[str, float], data: Path | None) -> dict[str, 
         except DataError as error:
             return {**row, "status": "skipped", "reason": str(error)}
         except Exception as error:  # an estimator may fail in any way; the failure is its result
-            return {**row, "status": "error", "reason": f"{type(error).__name__}: {error}"}
+            kind = {"kind": "reference"} if reference else {}
+            return {**row, **kind, "status": "error", "reason": f"{type(error).__name__}: {error}"}
     cost = {"seconds": seconds, "step_us": 1e6 * seconds / len(record), "steps": len(record), "peak_mb": _peak()}
     return {**row, **cost, **judged}
 

@@ -54,7 +54,7 @@ def values(variant: str) -> dict[str, Value]:
     return {name: _value(text) for name, _, text in (part.partition("=") for part in variant.split(","))}
 
 
-def chosen(entries: Iterable[str], known: Mapping[str, Estimator]) -> dict[str, dict[str, None]]:
+def chosen(entries: Iterable[str], known: Mapping[str, Any]) -> dict[str, dict[str, None]]:
     """Per estimator named by the entries, in order, the labels of its grid points ("" for a plain entry).
 
     A pattern with a grid means the estimators that take its keywords; a full name must take them.
@@ -89,9 +89,10 @@ def keywords(estimator: Estimator) -> dict[str, Any] | None:
     return found
 
 
-def _refusal(estimator: Estimator, grid: Mapping[str, list[Value]]) -> str | None:
+def _refusal(estimator: Any, grid: Mapping[str, list[Value]]) -> str | None:
     """Why an estimator does not take a grid, in a sentence, or None."""
-    known = keywords(estimator)
+    # A reference row has no keywords.
+    known = keywords(estimator) if isinstance(estimator, Estimator) else {}
     if known is None:
         return None
     for name, points in grid.items():

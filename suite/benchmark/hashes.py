@@ -17,11 +17,11 @@ import numpy as np
 
 import suite
 from suite import plugins
+from suite.benchmark import references
 from suite.benchmark.cells import Cell
 from suite.benchmark.recovery import OURS, RIVALS
 from suite.case import Case
 from suite.errors import DataError
-from suite.estimator import Estimator
 
 # Plug-ins share code through these packages; what they take from elsewhere is pinned by the version.
 SHARED = ("estimators", "baselines", "suite.kernels", "suite.filtering", "suite.smoothing")
@@ -34,7 +34,7 @@ def _digest(*parts: Any) -> str:
     return hashlib.sha256(json.dumps(parts, default=str).encode()).hexdigest()[:16]
 
 
-def plugin(estimator: Estimator) -> str:
+def plugin(estimator: object) -> str:
     """A hash of the source of an estimator's module and of what it takes from plug-in folders and kernels."""
     todo, seen = [type(estimator).__module__], set()
     texts = []
@@ -109,7 +109,7 @@ class Keys:
     """The key of every cell and every tuning, each hash computed once."""
 
     def __init__(self, data: Path | None) -> None:
-        self.plugin = cache(lambda name: method(name) if name in METHODS else plugin(plugins.estimators()[name]))
+        self.plugin = cache(lambda name: method(name) if name in METHODS else plugin(references.methods()[name]))
         self.case = cache(lambda name: case(plugins.cases()[name], data))
         self.measures = cache(measures)
 

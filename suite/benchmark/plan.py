@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from suite import plugins
-from suite.benchmark import grids
+from suite.benchmark import grids, references
 from suite.benchmark.cells import Cell
 from suite.benchmark.conditions import CONDITIONS, inapplicable
 from suite.benchmark.recovery import OURS, RIVALS
@@ -57,13 +57,17 @@ class Plan:
         """Every cell. A measured case (noise 0, as it is) is judged untuned, once a run: `runs` by case, else one."""
         if self.kind == "recovery":
             return self._recovery_cells()
-        estimators = plugins.estimators()
+        estimators = references.methods()
         picked = grids.chosen(self.estimators, estimators)
         cells = []
         for case in self.chosen_cases():
             measured = case.truth is None
             for noise in (0.0,) if measured else self.noises or case.noises:
                 for name, points in picked.items():
+                    if name in references.REFERENCES:
+                        count = 0 if measured else self.seeds
+                        cells += [Cell(case.name, noise, name, references.VARIANT, seed) for seed in range(count)]
+                        continue
                     for variant in (*(self.variants if "" in points else ()), *filter(None, points)):
                         if variant == "tuned" and (measured or not estimators[name].tuning):
                             continue
