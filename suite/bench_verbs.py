@@ -48,6 +48,10 @@ def add_parser(subparsers: Any) -> None:
     table.add_argument("--only", metavar="TEXT", help="lines with this in case, estimator or variant")
     table.add_argument("-o", "--output", type=Path, metavar="FILE", help="write .csv, .parquet or .json")
     verbs.add_parser("plot", parents=[store, out, as_json], help="figures from the stored results, nothing is run")
+    report = verbs.add_parser(
+        "report", parents=[store, out, as_json], help="the page, its figures and tables from the store, nothing is run"
+    )
+    report.add_argument("--plan", metavar="NAME|FILE", help="the results of one plan, default all")
     recovery = verbs.add_parser(
         "recovery", parents=[store, out, as_json], help="how surely the missing effect is named"
     )
@@ -71,8 +75,8 @@ def _count(text: str) -> int:
 def run(args: argparse.Namespace) -> int:
     """Run a verb; 0 done, 2 by InputError."""
     verb = {
-        "list": _list, "run": _run, "tune": _run, "table": _table, "plot": _plot, "recovery": _recovery,
-        "claims": _claims, "measured": _measured, "table1": _table_one,
+        "list": _list, "run": _run, "tune": _run, "table": _table, "plot": _plot, "report": _report,
+        "recovery": _recovery, "claims": _claims, "measured": _measured, "table1": _table_one,
     }  # fmt: skip
     return verb[args.bench](args)
 
@@ -192,6 +196,22 @@ def _plot(args: argparse.Namespace) -> int:
     rows, _ = _stored(args.store, None)
     paths = [str(path) for path in bench_figures.draw(rows, args.output)]
     print(table.to_json(paths) if args.json else "\n".join(paths))
+    return 0
+
+
+def _report(args: argparse.Namespace) -> int:
+    from suite.benchmark import plan, table, tuning
+    from suite.benchmark.store import Store
+    from suite.errors import InputError
+    from suite.report import bench_page
+
+    rows, recovery = _stored(args.store, plan.load(args.plan) if args.plan else None)
+    if recovery:
+        raise InputError(f"plan {args.plan!r} is of the recovery benchmark; its page is made by: bench recovery")
+    with Store(args.store, must_exist=True) as store:
+        tunings = tuning.stored(store)
+    made = bench_page.write(rows, tunings, args.output, str(args.store))
+    print(table.to_json(made) if args.json else "\n\n".join(made["verdict"]) + "\n\n" + "\n".join(made["files"]))
     return 0
 
 

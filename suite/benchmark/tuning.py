@@ -10,6 +10,7 @@ that the sensitivity to each number can be drawn.
 
 from __future__ import annotations
 
+import json
 import math
 import warnings
 from collections.abc import Mapping
@@ -22,6 +23,7 @@ from scipy.stats import qmc
 
 from suite import plugins
 from suite.benchmark.cells import experiment
+from suite.benchmark.store import Store
 from suite.case import Case
 from suite.estimator import Estimator, Range
 from suite.prior import default_prior
@@ -82,6 +84,12 @@ def tune(case_name: str, noise: float, name: str, data: Path | None) -> dict[str
         "noise": noise,
         "estimator": name,
     }
+
+
+def stored(store: Store) -> list[dict[str, Any]]:
+    """Every tuning of a store, the oldest first."""
+    found = store.connection.execute('SELECT "values" FROM tunings ORDER BY "when"')
+    return [dict(json.loads(row[0])) for row in found]
 
 
 def _even(count: int) -> Array:

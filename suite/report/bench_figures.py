@@ -95,7 +95,7 @@ def _boxes(rows: Sequence[Row], case: str) -> Figure:
                 ]
                 _box(ax, k, [score(row, metric) for row in found], BLUE if variant == "tuned" else ORANGE)
             ax.set_xscale("log")
-            _decades(ax.xaxis)
+            decades(ax.xaxis)
             ax.grid(axis="x", color="0.9")
             ax.set_axisbelow(True)
             ax.set_xlabel(label)
@@ -107,7 +107,7 @@ def _boxes(rows: Sequence[Row], case: str) -> Figure:
     return figure
 
 
-def _decades(axis: Axis) -> None:
+def decades(axis: Axis) -> None:
     """Ticks at 1, 2 and 5 of each decade, as plain numbers."""
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
@@ -141,7 +141,7 @@ def _matrix(rows: Sequence[Row]) -> Figure:
         value = grid[i, j]
         dark = np.isfinite(value) and abs(np.log2(value)) > 1.3
         text = f"{value:.2f}" if value < 100 else ">100"
-        if np.isnan(value):
+        if not np.isfinite(value):
             line = summary.get((*columns[j], *names[i]))
             text = "" if line is None else "failed" if line["ok"] == 0 else "no EKF"
         ax.text(j, i, text, ha="center", va="center", fontsize=6.5, color="white" if dark else "black")
@@ -184,7 +184,7 @@ def _pace(rows: Sequence[Row], case: str) -> Figure:
     figure.legend(loc="outside right upper", fontsize=7.5, frameon=False)
     ax.set_xscale("log")
     ax.set_yscale("log")
-    _decades(ax.yaxis)
+    decades(ax.yaxis)
     ax.set_xlabel("run time a step [microseconds]")
     ax.set_ylabel("state error / sd, median")
     ax.set_title(
