@@ -23,9 +23,9 @@ class PredictiveFilter(Estimator):
 
     d, constant over a step, minimises (y - yhat)' R^-1 (y - yhat) + d' W d at the step's end, where yhat is expanded
     in Lie derivatives up to the relative degree of each output. d at a sample is that of the step that ends there.
-    W = w_scale dt / Q, Q the prior's density. Without a w_scale the covariance constraint chooses it from the whole
-    record: the largest at which the mean of e^2 / R, e = y - h(xhat), reported as "covariance ratio", is 1 (else as
-    near to 1 as it gets). The first state is the prior's, which no measurement corrects; there is no covariance.
+    W = w_scale dt / Q, Q the prior's density. w_scale None: chosen from the whole record by the covariance constraint,
+    the largest at which the mean of e^2 / R, e = y - h(xhat), reported as "covariance ratio", is 1 (else as near to 1
+    as it gets). The first state is the prior's, which no measurement corrects; there is no covariance.
     """
 
     name = "predictive-filter"
@@ -36,7 +36,7 @@ class PredictiveFilter(Estimator):
             return "no output responds to an error in a suspected equation, at any order of its derivatives"
         return None
 
-    def estimate(self, model: Model, record: Record, w_scale: float | None = None) -> Estimate:
+    def estimate(self, model: Model, record: Record, w_scale: float | None = 1.0) -> Estimate:
         prior = prior_of(record)
         density = prior.Q[[list(model.states).index(name) for name in model.suspects]]
 
