@@ -68,7 +68,24 @@ def parser() -> argparse.ArgumentParser:
     verb.add_argument(
         "-o", "--output", type=Path, required=True, metavar="DIR", help="models, ledger, figures, report.html"
     )
+    verb = verbs.add_parser("watch", parents=[as_json], help="sample by sample: the model error, and an alarm")
+    verb.add_argument("model", type=Path, metavar="MODEL", help="model file (TOML)")
+    verb.add_argument("data", metavar="DATA", help="a CSV file, or - for lines on standard input as they come")
+    verb.add_argument("--effect", metavar="ID", help="follow the coefficients of this effect of `unmodelled list`")
+    verb.add_argument("--equation", metavar="NAME", help="the state in whose rate it acts, where there is a choice")
+    verb.add_argument("--memory", type=float, metavar="TIME", help="how long the past counts, default 200 samples")
+    verb.add_argument("--false-alarms", type=float, metavar="RATE", help="a sample of a right model, default 1e-5")
+    verb.add_argument("--first", type=int, metavar="N", help="samples to set up on, default 40, or 200 without sigma")
+    verb.add_argument("--exact", action="store_true", help="the parameters are exact, whatever the model file says")
+    verb.add_argument("--strict", action="store_true", help="exit with 1 if there was an alarm")
     bench_verbs.add_parser(verbs)
+    verb = verbs.add_parser("new", parents=[as_json], help="a commented plug-in file that passes `unmodelled test`")
+    verb.add_argument("kind", choices=("estimator", "case", "effect"), help="what to write")
+    verb.add_argument("name", metavar="NAME", help="its name, such as my-filter")
+    verb.add_argument("-o", "--output", type=Path, metavar="DIR", help="folder to write to, default where it is found")
+    verb.add_argument("--package", action="store_true", help="a folder NAME to install, with the entry point")
+    verb = verbs.add_parser("test", parents=[as_json], help="the contract checks of plug-ins; 1 if one fails")
+    verb.add_argument("names", nargs="*", metavar="NAME|FILE.py", help="plug-ins of `unmodelled list`, default all")
     return top
 
 
@@ -81,10 +98,22 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         if args.verb == "bench":
             return bench_verbs.run(args)
+        if args.verb == "watch":
+            from suite import watch_verb
+
+            return watch_verb.run(args)
         if args.verb == "list":
             from suite import listing
 
             return listing.run(args)
+        if args.verb == "new":
+            from suite import scaffold
+
+            return scaffold.run(args)
+        if args.verb == "test":
+            from suite import contract
+
+            return contract.run(args)
         from suite import verbs
 
         return int(getattr(verbs, args.verb)(args))

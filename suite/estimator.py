@@ -43,11 +43,19 @@ class Estimator(abc.ABC):
 
     `tuning` says what the equal-budget tuner may move: keyword arguments of `estimate`, each as (low, high, scale).
     `kind` is "filter" (causal) or "smoother". `record` has one run and a `prior`; R there is the variance of a sample.
+
+    `optimal` is a claim that `unmodelled test` holds it to: the model error for which, on a linear plant with Gaussian
+    noise, x and P are those of the Kalman filter (of the fixed-interval smoother, if it is one) and P is calibrated:
+    "white noise" of the prior's density Q, a "random walk" or "integrated walk" as `with_random_walk` and
+    `with_integrated_walk` make them, or None, no such claim.
+    `optimal_within`: how closely, in posterior standard deviations (an ensemble comes near only).
     """
 
     name: ClassVar[str]
     kind: ClassVar[Literal["filter", "smoother"]] = "filter"
     tuning: ClassVar[Mapping[str, Range]] = {}
+    optimal: ClassVar[Literal["white noise", "random walk", "integrated walk"] | None] = None
+    optimal_within: ClassVar[float] = 1e-4
 
     @abc.abstractmethod
     def estimate(self, model: Model, record: Record, *args: Any, **kwargs: Any) -> Estimate:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import importlib
 import inspect
 import pkgutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 from importlib.metadata import entry_points
 from types import ModuleType
 from typing import Any
@@ -17,6 +17,11 @@ from suite.effect import Effect
 from suite.estimator import Estimator
 from suite.metric import Metric
 
+# What each kind of plug-in is an instance (estimators and baselines: a subclass) of.
+TYPES: dict[str, type] = {
+    "estimators": Estimator, "baselines": Estimator, "cases": Case, "effects": Effect, "metrics": Metric
+}  # fmt: skip
+WORDS = {Estimator: "an estimator", Case: "a case", Effect: "an effect", Metric: "a metric"}
 KINDS = ("estimators", "baselines", "cases", "effects", "metrics")
 # Metrics are of the benchmark alone, so their folder is there.
 FOLDERS = {"metrics": "suite.benchmark.measures"}
@@ -24,10 +29,11 @@ FOLDERS = {"metrics": "suite.benchmark.measures"}
 
 @dataclass(frozen=True)
 class Found:
-    """The plug-ins of one kind by name, and those that could not be loaded with the reason."""
+    """The plug-ins of one kind by name, with where each came from; and those that could not be loaded, and why."""
 
     loaded: dict[str, Any] = field(default_factory=dict)
     failed: dict[str, str] = field(default_factory=dict)
+    origins: dict[str, str] = field(default_factory=dict)
 
 
 @cache
@@ -36,12 +42,16 @@ def find(kind: str) -> Found:
     found = Found()
     folder = FOLDERS.get(kind, kind)
     package = importlib.import_module(folder)
+    if kind == "baselines":
+        # Both are judged side by side under their names.
+        found.origins.update(find("estimators").origins)
     for file in sorted(info.name for info in pkgutil.iter_modules(package.__path__)):
         # What several plug-ins share has a name with _ and is none itself.
         if not file.startswith("_"):
-            _take(found, f"{folder}.{file}", lambda name=f"{folder}.{file}": importlib.import_module(name))
+            take(found, kind, f"{folder}.{file}", partial(importlib.import_module, f"{folder}.{file}"))
     for point in sorted(entry_points(group=f"unmodelled.{kind}"), key=lambda point: point.name):
-        _take(found, f"{point.value} (entry point {point.name})", point.load)
+        source = f" of {point.dist.name}" if point.dist is not None else ""
+        take(found, kind, f"{point.value} (entry point {point.name}{source})", point.load)
     return found
 
 
@@ -65,23 +75,71 @@ def metrics() -> dict[str, Metric]:
     return dict(find("metrics").loaded)
 
 
-def _take(found: Found, label: str, load: Any) -> None:
+def take(found: Found, kind: str, label: str, load: Callable[[], Any]) -> None:
+    """Add the plug-ins that `load` gives (a module or a plug-in), or the reason why there are none, under the label.
+
+    A `kind` that is none of KINDS takes plug-ins of every kind.
+    """
+    wanted = (TYPES[kind],) if kind in TYPES else tuple(WORDS)
     try:
-        items = {item.id if isinstance(item, Effect) else item.name: item for item in _items(load())}
-    except Exception as error:  # a plug-in may fail in any way; the others must still run
+        thing = load()
+        items = list({id(item): item for item in _items(thing)}.values())
+        fitting = [item for item in items if isinstance(item, wanted)]
+        if not fitting:
+            raise TypeError(_says_nothing(thing, items, wanted))
+        named = [(_name(item), item) for item in fitting]
+    except (Exception, SystemExit) as error:  # a plug-in may fail in any way; the others must still run
         found.failed[label] = f"{type(error).__name__}: {error}"
         return
-    for name, item in items.items():
-        if name in found.loaded:
-            found.failed[label] = f"the name {name!r} is already taken"
+    refused = []
+    for name, item in named:
+        if found.loaded.get(name) is item:
+            continue
+        if name in found.origins:
+            refused.append(f"the name {name!r} is already taken, by {found.origins[name]}; rename one")
         else:
-            found.loaded[name] = item
+            found.loaded[name], found.origins[name] = item, label
+    if refused:
+        found.failed[label] = "; ".join(refused)
+
+
+def kind_of(item: Any) -> str:
+    """The kind of a plug-in; an estimator that is no baseline of the package is one of "estimators"."""
+    return next(kind for kind, wanted in TYPES.items() if isinstance(item, wanted))
+
+
+def _name(item: Any) -> str:
+    """A plug-in's name or id."""
+    key = "id" if isinstance(item, Effect) else "name"
+    name = getattr(item, key, None)
+    if not isinstance(name, str) or not name or len(name.split()) != 1:
+        what = f"the name {name!r}" if name is not None else "no name"
+        raise TypeError(f'{_called(item)} has {what}; write {key} = "my-plug-in", without blanks')
+    return name
+
+
+def _called(item: Any) -> str:
+    return type(item).__name__ if isinstance(item, Estimator) else WORDS[type(item)]
+
+
+def _says_nothing(thing: Any, items: Sequence[Any], wanted: tuple[type, ...]) -> str:
+    """Why there is no plug-in of the wanted types."""
+    what = " or ".join(WORDS[one] for one in wanted)
+    if items:
+        kind = kind_of(items[0])
+        return f"it holds {WORDS[TYPES[kind]]} where {what} belongs; move it to the folder or entry points of {kind}"
+    values = vars(thing).values() if isinstance(thing, ModuleType) else [thing]
+    for value in values:
+        if inspect.isclass(value) and issubclass(value, Estimator) and value is not Estimator:
+            lacking = ", ".join(sorted(getattr(value, "__abstractmethods__", ()))) or "nothing"
+            return f"the class {value.__name__} lacks {lacking}; write it"
+    return f"it holds no plug-in; expected {what}"
 
 
 def _items(thing: Any) -> Iterator[Any]:
     """The plug-ins in a module, or the one that an entry point names."""
     for value in vars(thing).values() if isinstance(thing, ModuleType) else [thing]:
-        if isinstance(value, (Case, Effect, Metric)):
+        if isinstance(value, (Case, Effect, Metric)) or (isinstance(value, Estimator) and value is thing):
             yield value
         elif inspect.isclass(value) and issubclass(value, Estimator) and not inspect.isabstract(value):
             # A class that a module imports from another is that one's plug-in.

@@ -21,7 +21,7 @@ def default_prior(model: Model, record: Record, noise: Array) -> Prior:
     """
     first = record.runs[0]
     seen = ~np.isnan(first.y)
-    spread = np.array([np.std(first.y[seen[:, j], j]) for j in range(first.y.shape[1])])
+    spread = np.array([np.std(first.y[seen[:, j], j]) if seen[:, j].any() else 0.0 for j in range(first.y.shape[1])])
     R = np.maximum(noise, 1e-6 * np.maximum(spread, 1e-300)) ** 2
     n = len(model.states)
     x0, P0 = np.zeros(n), np.zeros(n)
@@ -36,9 +36,14 @@ def default_prior(model: Model, record: Record, noise: Array) -> Prior:
             x0[i] = given.value if given is not None else 0.0
             P0[i] = float(np.max(spread**2))
     dt = float(np.median(first.dt))
-    pace = max(float(np.sqrt(np.nanmean((np.diff(first.y[:, j]) / first.dt) ** 2))) for j in range(first.y.shape[1]))
+    pace = max(_pace(first.t[seen[:, j]], first.y[seen[:, j], j]) for j in range(first.y.shape[1]))
     Q = np.array([pace**2 * dt if name in model.suspects else 0.0 for name in model.states])
     return Prior(x0, np.diag(P0), R, Q)
+
+
+def _pace(t: Array, y: Array) -> float:
+    """The root mean square of the rate of one output between the samples at which it was seen; 0 for fewer than two."""
+    return float(np.sqrt(np.mean((np.diff(y) / np.diff(t)) ** 2))) if len(t) > 1 else 0.0
 
 
 def prior_of(record: Record) -> Prior:

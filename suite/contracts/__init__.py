@@ -1,0 +1,1 @@
+"""What each kind of plug-in must hold, one function a check."""
