@@ -42,11 +42,11 @@ def _run(table: Table, model: Model) -> Record:
     """One file as one run."""
     if not model.outputs:
         raise DataError(f"{table.file}: the model has no outputs to compare with; add a table [outputs]")
-    time = _time_column(table, model)
+    time = time_column(table, model)
     inputs = [entry.column for entry in model.inputs.values()]
     outputs = [entry.column for entry in model.outputs.values()]
     for name in (*inputs, *outputs):
-        _there(table, name)
+        there(table, name)
     columns = table.read([*dict.fromkeys([time, *inputs, *outputs])])
     for name, column in columns.items():
         if np.any(np.isinf(column)):
@@ -66,13 +66,13 @@ def _run(table: Table, model: Model) -> Record:
     )
 
 
-def _time_column(table: Table, model: Model) -> str:
+def time_column(table: Table, model: Model) -> str:
     """The model's time column; where it names none, `t`, else the first one that is nothing else."""
     if model.time is not None:
-        _there(table, model.time)
+        there(table, model.time)
         return model.time
     if "t" in table.columns:
-        _there(table, "t")
+        there(table, "t")
         return "t"
     used = {entry.column: name for name, entry in model.inputs.items()}
     used |= {entry.column: name for name, entry in model.outputs.items()}
@@ -85,7 +85,7 @@ def _time_column(table: Table, model: Model) -> str:
     return first
 
 
-def _there(table: Table, name: str) -> None:
+def there(table: Table, name: str) -> None:
     """Refuse a column that is missing or there twice, with those that are there."""
     count = table.columns.count(name)
     if count > 1:

@@ -95,7 +95,7 @@ class _Text:
         if marks == len(head):
             raise DataError(f"{self.name}: no rows; expected a line of column names and rows of numbers")
         # Some programs write the names as the last of the comment lines.
-        self.separator = _separator(head[marks])
+        self.separator = separator(head[marks])
         if marks and head[marks - 1].strip() and all(_is_number(cell) for cell in self.split(head[marks])):
             marks -= 1
         # Lines before the names, counted from the file's start.
@@ -205,7 +205,7 @@ def _decoded(file: Path) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
-def _separator(line: str) -> str:
+def separator(line: str) -> str:
     """The separator that splits the header most; names in quotes may hold others."""
     bare = re.sub(r'"[^"]*"', "", line)
     return max((",", ";", "\t"), key=bare.count)

@@ -148,9 +148,9 @@ def add(args: argparse.Namespace) -> int:
         raise InputError(
             f"no effect {args.effect!r}; {f'did you mean {close[0]}? ' if close else ''}see `unmodelled list`"
         )
-    term = _chosen(model, args.effect, args.equation)
+    term = chosen_term(model, args.effect, args.equation)
     record = read_record(args.data, model) if args.data else None
-    start = _numbers(model, term, record)
+    start = start_numbers(model, term, record)
     new = grown(model, [term], [start])
     if record is not None:
         new = fit(new, record).model
@@ -172,7 +172,7 @@ def add(args: argparse.Namespace) -> int:
     return 0
 
 
-def _chosen(model: Model, effect: str, equation: str | None) -> Term:
+def chosen_term(model: Model, effect: str, equation: str | None) -> Term:
     """The one candidate that is meant; where several are, the sentence names them."""
     places = [*model.states, *model.outputs, *model.inputs]
     if equation is not None and equation not in places:
@@ -191,7 +191,7 @@ def _chosen(model: Model, effect: str, equation: str | None) -> Term:
     return terms[0]
 
 
-def _numbers(model: Model, term: Term, record: Record | None) -> Mapping[str, Parameter]:
+def start_numbers(model: Model, term: Term, record: Record | None) -> Mapping[str, Parameter]:
     """Start values of a new term's parameters: coefficients zero, inner scales in the middle of the visited range."""
     free = {name: Parameter(0.0, free=True) for name in term.coefficients}
     free |= {z: Parameter(0.0) for z in term.states}

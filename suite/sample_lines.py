@@ -1,0 +1,100 @@
+"""Samples from lines of CSV as they come, the header first. Each defect is named with its line."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from suite.errors import DataError
+from suite.model import Model
+from suite.readers import there, time_column
+from suite.tables import DECIMAL_COMMA, MISSING, Table, separator
+
+Array = npt.NDArray[np.float64]
+Sample = tuple[float, Array, Array]
+
+
+def samples(lines: Iterable[str], model: Model, source: str) -> Iterator[Sample]:
+    """Each line's time, inputs (inputs,) and outputs (outputs,; NaN where the cell is empty), as soon as it is there.
+
+    Empty lines and lines that open with # are passed over; an empty input keeps its last value. Raises DataError.
+    """
+    numbered = ((at, line) for at, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith("#"))
+    found = next(numbered, None)
+    if found is None:
+        raise DataError(f"{source}: no lines; expected a line of column names, then a sample a line")
+    reader = _Reader(found[1], model, source)
+    for at, line in numbered:
+        sample = reader.sample(at, line)
+        if sample is not None:
+            yield sample
+
+
+class _Reader:
+    """The columns, and what the last line said."""
+
+    def __init__(self, header: str, model: Model, source: str) -> None:
+        self.source, self.mark = source, separator(header)
+        names = [name.strip() for name in self.cells(header)]
+        while names and not names[-1]:
+            names.pop()
+        table = Table(source, tuple(names), lambda _: {}, lambda row: f"line {row + 2}")
+        if not model.outputs:
+            raise DataError(f"{source}: the model has no outputs to compare with; add a table [outputs]")
+        time = time_column(table, model)
+        wanted = [entry.column for entry in model.inputs.values()]
+        wanted += [entry.column for entry in model.outputs.values()]
+        for column in wanted:
+            there(table, column)
+        self.names = names
+        self.columns = [names.index(column) for column in (time, *wanted)]
+        self.inputs = len(model.inputs)
+        self.t, self.u = -math.inf, np.full(self.inputs, np.nan)
+
+    def cells(self, line: str) -> list[str]:
+        return next(csv.reader([line.rstrip("\r\n")], delimiter=self.mark, skipinitialspace=True), [])
+
+    def sample(self, at: int, line: str) -> Sample | None:
+        """The sample in line `at`, None where every cell is empty."""
+        cells = self.cells(line)
+        if all(cell.strip().lower() in MISSING for cell in cells):
+            return None
+        if len(cells) < len(self.names) or any(cell.strip() for cell in cells[len(self.names) :]):
+            raise self.refuse(at, f"{len(cells)} cells under {len(self.names)} column names", "give each its cell")
+        numbers = [self.number(at, cells[column], self.names[column]) for column in self.columns]
+        t = numbers[0]
+        if math.isnan(t):
+            raise self.refuse(at, f"no time in column {self.names[self.columns[0]]}", "fill the cell or leave the line")
+        if t <= self.t:
+            raise self.refuse(at, f"time does not increase ({t!r} after {self.t!r})", "send the samples in order")
+        self.t = t
+        given = np.array(numbers[1 : 1 + self.inputs])
+        u = np.where(np.isnan(given), self.u, given)
+        if np.isnan(u).any():
+            name = self.names[self.columns[1 + int(np.argmax(np.isnan(u)))]]
+            raise self.refuse(at, f"the input {name} is empty at the start", "begin where it is known")
+        self.u = u
+        return t, u, np.array(numbers[1 + self.inputs :])
+
+    def number(self, at: int, cell: str, name: str) -> float:
+        text = cell.strip()
+        if text.lower() in MISSING:
+            return math.nan
+        if self.mark != "," and DECIMAL_COMMA.match(text):
+            text = text.replace(",", ".")
+        try:
+            value = math.nan if "_" in text else float(text)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            shown = text if len(text) <= 40 else text[:37] + "..."
+            mend = "correct it, or leave the cell empty if it is missing"
+            raise self.refuse(at, f"column {name}: expected a number, got {shown!r}", mend)
+        return value
+
+    def refuse(self, at: int, what: str, mend: str) -> DataError:
+        return DataError(f"{self.source}, line {at}: {what}; {mend}")
