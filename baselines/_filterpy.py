@@ -103,8 +103,11 @@ class SteppedEKF(ExtendedKalmanFilter):
         self.x = self.moved
 
 
-def extended(model: Model, record: Record, prior: Prior) -> Pass:
-    """Filterpy's ExtendedKalmanFilter over one run, from prior.x0 at the first sample, which is used too."""
+def extended(model: Model, record: Record, prior: Prior, inflation: float = 1.0) -> Pass:
+    """Filterpy's ExtendedKalmanFilter over one run, from prior.x0 at the first sample, which is used too.
+
+    `inflation` multiplies the predicted covariance, per unit of time.
+    """
     plant = Plant(model, record)
     ekf = SteppedEKF(len(model.states), len(model.outputs))
     ekf.x, ekf.P = prior.x0.copy(), prior.P0.copy()
@@ -113,6 +116,8 @@ def extended(model: Model, record: Record, prior: Prior) -> Pass:
         ekf.moved, ekf.F = plant.transition(k, ekf.x)
         ekf.Q = np.diag(prior.Q * plant.dt(k))
         ekf.predict()
+        if inflation != 1.0:
+            ekf.P = inflation ** plant.dt(k) * ekf.P
 
     def update(k: int, seen: Seen, residual: Residual) -> float:
         ekf.update(

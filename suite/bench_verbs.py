@@ -61,6 +61,9 @@ def add_parser(subparsers: Any) -> None:
     measured.add_argument("--data", type=Path, metavar="DIR", help="folder of measured data that are not shipped")
     claims = verbs.add_parser("claims", parents=[as_json], help="published numbers beside ours")
     claims.add_argument("--brief", action="store_true", help="the ledger alone, without what the source leaves open")
+    twins = verbs.add_parser("twin", parents=[as_json], help="the long twin experiments with published errors")
+    twins.add_argument("-o", "--output", type=Path, metavar="FILE", required=True, help="JSON file to write")
+    twins.add_argument("--seeds", type=_count, default=20, metavar="N", help="runs of each method, default 20")
     one = verbs.add_parser("table1", parents=[out, as_json], help="the sources' Table 1 and what better methods reach")
     one.add_argument("--seeds", type=_count, default=5, metavar="N", help="seeds of the comparison, default 5")
 
@@ -77,6 +80,7 @@ def run(args: argparse.Namespace) -> int:
     verb = {
         "list": _list, "run": _run, "tune": _run, "table": _table, "plot": _plot, "report": _report,
         "recovery": _recovery, "claims": _claims, "measured": _measured, "table1": _table_one,
+        "twin": _twin,
     }  # fmt: skip
     return verb[args.bench](args)
 
@@ -242,4 +246,12 @@ def _table_one(args: argparse.Namespace) -> int:
 
     made = table_one_page.write(args.output, args.seeds)
     print(table.to_json(made) if args.json else made["text"])
+    return 0
+
+
+def _twin(args: argparse.Namespace) -> int:
+    from suite.benchmark import table, twin
+
+    made = twin.write(args.output, args.seeds, lambda text: print(text, file=sys.stderr))
+    print(table.to_json(made) if args.json else f"{args.output} holds {args.seeds} runs of {len(twin.METHODS)} methods")
     return 0

@@ -106,6 +106,8 @@ class PosteriorBound(Reference):
             return {"status": "error", "reason": f"the bound is not finite from t = {record.t[run.failed_at]:.4g} s on"}
         P = run.P if self.kind == "filter" else smoothed(run).P
         variance = np.maximum(np.einsum("kii->ki", P)[:, kept], 0.0).mean(axis=0)
+        if not np.any(variance > 0):
+            return {"status": "skipped", "reason": "the first state is known, so the true model gives it without error"}
         scale = np.maximum(truth.x.std(axis=0), 1e-300)
         rmse = dict(zip(case.deficient.states, np.sqrt(variance).tolist(), strict=True))
         return {"state_rmse": rmse, "state_nrmse": float(np.sqrt(np.mean(variance / scale**2)))}
