@@ -26,7 +26,7 @@ from suite.errors import InputError
 
 # Tasks sent per thread of the cluster: one to run and one to follow it at once.
 AHEAD = 2
-CONNECT = 30.0
+CONNECT = 10.0
 PACKAGES = ("suite", "estimators", "baselines", "cases", "effects")
 
 
@@ -40,7 +40,7 @@ def run(tasks: Iterable[Task | None], address: str, limit: float, memory: float)
     except ImportError:
         raise InputError("--dask needs the package distributed; install unmodelled[dask]") from None
     try:
-        client = Client(address, timeout=CONNECT, set_as_default=False)
+        client = Client(address, timeout=CONNECT)
     except (OSError, ValueError, RuntimeError) as error:
         raise InputError(f"no Dask scheduler answers at {address} ({error}); start one, or mend --dask") from None
     with client:

@@ -20,6 +20,8 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any
 
+from suite import plugins
+
 # A process has this long to start, in seconds: it imports the numerics and may compile the kernels.
 START = 300.0
 # Resident memory of a process in MiB; a worker with numerics and plug-ins imported has 260.
@@ -144,6 +146,8 @@ def _serve(pipe: Connection) -> None:
         os.dup2(2, 1)
     with contextlib.suppress(KeyboardInterrupt, EOFError, BrokenPipeError, ConnectionResetError):
         importlib.import_module("suite.benchmark.cells")
+        # Not in the first task's time: the plug-ins and their models take seconds to build.
+        plugins.estimators(), plugins.cases()
         pipe.send(None)
         while True:
             function, arguments = pipe.recv()
