@@ -38,20 +38,34 @@ class Found:
 
 @cache
 def find(kind: str) -> Found:
-    """All plug-ins of a kind: "estimators" and "baselines" (instances), "cases", "effects", "metrics"."""
+    """All plug-ins of a kind: "estimators" and "baselines" (instances), "cases", "effects", "metrics".
+
+    The package's own come first, so that no other distribution can take a name from them.
+    """
+    own = _own(kind)
+    found = Found(dict(own.loaded), dict(own.failed), dict(own.origins))
+    # Estimators and baselines are judged side by side under their names.
+    rival = {"estimators": lambda: _own("baselines"), "baselines": lambda: find("estimators")}.get(kind)
+    if rival is not None:
+        found.origins.update(rival().origins)
+    for point in sorted(entry_points(group=f"unmodelled.{kind}"), key=lambda point: point.name):
+        source = f" of {point.dist.name}" if point.dist is not None else ""
+        take(found, kind, f"{point.value} (entry point {point.name}{source})", point.load)
+    return found
+
+
+@cache
+def _own(kind: str) -> Found:
+    """The plug-ins in the package's folder of a kind."""
     found = Found()
+    if kind == "baselines":
+        found.origins.update(_own("estimators").origins)
     folder = FOLDERS.get(kind, kind)
     package = importlib.import_module(folder)
-    if kind == "baselines":
-        # Both are judged side by side under their names.
-        found.origins.update(find("estimators").origins)
     for file in sorted(info.name for info in pkgutil.iter_modules(package.__path__)):
         # What several plug-ins share has a name with _ and is none itself.
         if not file.startswith("_"):
             take(found, kind, f"{folder}.{file}", partial(importlib.import_module, f"{folder}.{file}"))
-    for point in sorted(entry_points(group=f"unmodelled.{kind}"), key=lambda point: point.name):
-        source = f" of {point.dist.name}" if point.dist is not None else ""
-        take(found, kind, f"{point.value} (entry point {point.name}{source})", point.load)
     return found
 
 

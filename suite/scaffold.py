@@ -56,9 +56,12 @@ def run(args: argparse.Namespace) -> int:
             f'with an entry point, [project.entry-points."unmodelled.{KINDS[args.kind]}"] {name} = "{module}", '
             f"as `unmodelled new {args.kind} {name} --package` writes it",
         ]
-    if args.kind != "effect":
-        chosen = "--only" if args.kind == "estimator" else "--plan full --only"
-        steps.append(f"once it is registered, run it: unmodelled bench run {chosen} {name}")
+    if args.kind == "estimator":
+        steps.append(f"once it is registered, judge it: unmodelled bench run --plan quick --only {name}")
+    elif args.kind == "case":
+        steps.append(
+            f'once it is registered, judge on it: cases = ["{name}"] in plan.toml, unmodelled bench run --plan plan.toml'
+        )
     if args.json:
         print(json.dumps({"files": [str(path) for path in written], "registered": registered, "next": steps}, indent=1))
     else:

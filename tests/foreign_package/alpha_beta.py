@@ -1,0 +1,39 @@
+"""A filter with a constant gain, in plain numpy."""
+
+import numpy as np
+
+from suite.estimator import Estimate, Estimator
+from suite.prior import prior_of
+
+
+class AlphaBeta(Estimator):
+    """Luenberger observer with a constant gain. Luenberger (1964); d is its correction over the step."""
+
+    name = "alpha-beta"
+    tuning = {"gain": (0.01, 1.0, "log")}
+
+    def estimate(self, model, record, gain=0.3):
+        prior = prior_of(record)
+        N, n = len(record), len(model.states)
+        xs, d, x = np.zeros((N, n)), np.zeros((N, n)), prior.x0.copy()
+        for k in range(N):
+            t, u = float(record.t[k]), tuple(record.u[k])
+            dt = float(record.t[max(k, 1)] - record.t[max(k, 1) - 1])
+            if k > 0:
+                x, F = model.transition(float(record.t[k - 1]), x, tuple(record.u[k - 1]), dt, u)
+            seen = ~np.isnan(record.y[k])
+            H = model.output_jacobian(t, x, u)[seen]
+            # The least change of position and speed that moves the outputs by a share of the residual.
+            shift = gain * np.linalg.pinv(H) @ (record.y[k] - model.output(t, x, u))[seen]
+            x = x + shift
+            xs[k], d[k] = x, shift / dt
+        return Estimate(x=xs, d=d)
+
+
+class Taken(Estimator):
+    """An estimator under a name that is taken."""
+
+    name = "ekf"
+
+    def estimate(self, model, record):
+        return Estimate(x=np.zeros((len(record), len(model.states))))
