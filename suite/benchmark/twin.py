@@ -81,6 +81,12 @@ METHODS = {
         0.65,
         lambda model, record, prior, seed: ensemble(model, record, prior, members=10, inflation=1.04).x,
     ),
+    # filterpy's perturbations do not add up to zero, DAPPER's do: ten members then need more inflation.
+    "enkf-perturbed-10-inflated": Method(
+        "ensemble Kalman filter with perturbed readings (filterpy), 10 members, inflation 1.2",
+        0.65,
+        lambda model, record, prior, seed: ensemble(model, record, prior, members=10, inflation=1.2).x,
+    ),
     "enkf-perturbed-100": Method(
         "ensemble Kalman filter with perturbed readings (filterpy), 100 members, inflation 1.01",
         0.56,
