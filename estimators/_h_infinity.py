@@ -156,8 +156,9 @@ def least_gamma(model: Model, record: Record, prior: Prior, L: Array) -> float:
             high *= 0.1
         else:
             low = 0.1 * high
-    while high - low > FOUND * high:
-        middle = math.sqrt(low * high) if low > 0.0 else 0.5 * high
+    # Where nothing is uncertain the filter exists for every gamma.
+    while low > 0.0 and high - low > FOUND * high:
+        middle = math.sqrt(low * high)
         if central(model, record, prior, L, middle).failed_at is None:
             high = middle
         else:

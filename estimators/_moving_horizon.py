@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -38,8 +39,10 @@ def translated(expression: sympy.Expr, names: Mapping[sympy.Symbol, Any], casadi
         return reduce(lambda a, b: a * b, parts)
     if e.is_Pow:
         return casadi.sqrt(parts[0]) if e.exp == sympy.Rational(1, 2) else parts[0] ** parts[1]
-    own = {sympy.Abs: "fabs", sympy.Min: "fmin", sympy.Max: "fmax"}.get(e.func, e.func.__name__)
-    return reduce(getattr(casadi, own), parts) if own in ("fmin", "fmax") else getattr(casadi, own)(*parts)
+    if e.func in (sympy.Min, sympy.Max):
+        return reduce(casadi.fmin if e.func is sympy.Min else casadi.fmax, parts)
+    # The other functions have one name in both.
+    return casadi.fabs(*parts) if e.func is sympy.Abs else getattr(casadi, e.func.__name__)(*parts)
 
 
 @dataclass(frozen=True)
@@ -59,8 +62,8 @@ def window(model: Model, prior: Prior, steps: int, substeps: int) -> Window:
     Pbar; x_(k+1) = F_k(x_k) + sqrt(Q dt) w_k, F_k `substeps` steps of RK4. Minimised: a'a + sum w'w
     + sum seen (y - h(x_k))^2 / R. A step with dt = 0 changes nothing: so a shorter window is a special case.
     """
-    import casadi
-
+    # Optional, and imported where it is used: the plug-in loads without it.
+    casadi: Any = importlib.import_module("casadi")
     n, nu, ny = len(model.states), len(model.inputs), len(model.outputs)
     noisy = np.flatnonzero(prior.Q > 0.0)
     rate, output = _functions(model, casadi)
@@ -68,7 +71,8 @@ def window(model: Model, prior: Prior, steps: int, substeps: int) -> Window:
     u0, u1 = casadi.SX.sym("u0", nu), casadi.SX.sym("u1", nu)
     moved = x
     for part in range(substeps):
-        h, stages = dt / substeps, []
+        h = dt / substeps
+        stages: list[Any] = []
         for offset in (0.0, 0.5, 0.5, 1.0):
             share = (part + offset) / substeps
             at = moved + offset * h * stages[-1] if stages else moved
@@ -81,7 +85,8 @@ def window(model: Model, prior: Prior, steps: int, substeps: int) -> Window:
     T, U = casadi.MX.sym("T", steps + 1), casadi.MX.sym("U", nu, steps + 1)
     Y, seen = casadi.MX.sym("Y", ny, steps + 1), casadi.MX.sym("seen", ny, steps + 1)
     path = casadi.horzcat(mean + S @ a, X)
-    cost, gaps = casadi.sumsqr(a) + casadi.sumsqr(w), []
+    cost = casadi.sumsqr(a) + casadi.sumsqr(w)
+    gaps = []
     for k in range(steps + 1):
         e = Y[:, k] - output(T[k], path[:, k], U[:, k])
         e = casadi.if_else(casadi.DM(model.angles) > 0, casadi.atan2(casadi.sin(e), casadi.cos(e)), e)
