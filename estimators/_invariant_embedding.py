@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from suite.estimator import Estimate
-from suite.filtering import held, rates
+from suite.filtering import filtered, held, rates
 from suite.kernels.embedding import continuous_embedding, discrete_embedding, embedding_workspace
 from suite.kernels.integrate import workspace
 from suite.kernels.matrix import flow_workspace
@@ -16,6 +16,7 @@ from suite.kernels.types import arrays
 from suite.model import Model
 from suite.prior import prior_of
 from suite.record import Prior, Record
+from suite.robustness import ErrorSystem, conditions, error_system
 
 Array = npt.NDArray[np.float64]
 Riccati = Literal["transition", "integration"]
@@ -25,12 +26,13 @@ Residual = Literal["before", "after"]
 class Weights(TypedDict, total=False):
     """What overrides the prior's: Q, the weight of J, (n,) or (n, n); R (outputs,); S0 (n, n), the first S.
 
-    Left out: density 1/(q_scale Q), the R of the sensors, P0/2.
+    Left out: density 1/(q_scale Q), the R of the sensors, P0/2. `judge`: evaluate the conditions of a robust estimate.
     """
 
     Q: Array | None
     R: Array | None
     S0: Array | None
+    judge: bool
 
 
 class ContinuousOptions(Weights, total=False):
@@ -106,7 +108,7 @@ def between_samples(model: Model, record: Record, R: Array) -> Array:
 
 def continuous(
     model: Model, record: Record, alpha: float, q_scale: float = 1.0, Q: Array | None = None, R: Array | None = None,
-    S0: Array | None = None, riccati: Riccati = "transition",
+    S0: Array | None = None, riccati: Riccati = "transition", judge: bool = True,
 ) -> Estimate:  # fmt: skip
     """The continuous filter (47)-(55) over one run; arguments as in `ContinuousOptions`.
 
@@ -137,29 +139,30 @@ def continuous(
         embedding_workspace(n, program.inputs, program.parameters, program.outputs_count), flow_workspace(n),
         X, S, D, info,
     )  # fmt: skip
-    return _estimate(model, record, X, S, D, info, inverse, alpha, Rk, note)
+    return _estimate(model, record, X, S, D, info, inverse, alpha, Rk, note, np.asarray(start), judge, predicted=True)
 
 
 def discrete(
     model: Model, record: Record, alpha: float, q_scale: float = 1.0, Q: Array | None = None, R: Array | None = None,
-    S0: Array | None = None, residual: Residual = "before",
+    S0: Array | None = None, residual: Residual = "before", judge: bool = True,
 ) -> Estimate:  # fmt: skip
     """The discrete filter (63)-(74) over one run, dhat as a rate; arguments as in `DiscreteOptions`."""
     prior, program = prior_of(record), model.program
     inverse = density(prior, q_scale, Q)
     Rs = np.asarray(prior.R if R is None else R, dtype=np.float64)
+    start = prior.P0 / 2.0 if S0 is None else S0
     n, N = program.n, len(record)
     X, S, jumps, info = np.zeros((N, n)), np.zeros((N, n, n)), np.zeros((N, n)), np.zeros(3, dtype=np.int64)
     work = embedding_workspace(n, program.inputs, program.parameters, program.outputs_count)
     discrete_embedding(
         program.rate, program.output, *arrays(record.t, record.u), model.linear_inputs,
-        *arrays(record.y, prior.x0, prior.P0 / 2.0 if S0 is None else S0), model.values, program.all_off(),
+        *arrays(record.y, prior.x0, start), model.values, program.all_off(),
         np.zeros(0, dtype=np.int64), *arrays(inverse / (2.0 * alpha), Rs), model.angles, int(residual == "after"),
         workspace(n, program.inputs, program.parameters, 0), work, X, S, jumps, info,
     )  # fmt: skip
     D = rates(model, record, held(X, _failed(info)), held(jumps, _failed(info)))
     Rk = Rs * np.concatenate([record.dt[:1], record.dt])[:, None]
-    return _estimate(model, record, X, S, D, info, inverse, alpha, Rk, "")
+    return _estimate(model, record, X, S, D, info, inverse, alpha, Rk, "", np.asarray(start), judge, predicted=False)
 
 
 def _failed(info: npt.NDArray[np.int64]) -> int | None:
@@ -168,11 +171,14 @@ def _failed(info: npt.NDArray[np.int64]) -> int | None:
 
 def _estimate(
     model: Model, record: Record, X: Array, S: Array, D: Array, info: npt.NDArray[np.int64],
-    inverse: Array, alpha: float, R: Array, note: str,
+    inverse: Array, alpha: float, R: Array, note: str, S0: Array, judge: bool,
+    *, predicted: bool,
 ) -> Estimate:  # fmt: skip
+    """`predicted`: S is that of the continuous filter, which a sample has not yet made smaller."""
     failed = _failed(info)
     X, S, D = held(X, failed), held(S, failed), held(D, failed)
-    status, report = "ok", {}
+    report: dict[str, float | str] = {}
+    status = "ok"
     if info[2] >= 0:
         report["definite until"] = float(record.t[info[2]])
         status, note = "indefinite", f"S lost definiteness at t = {record.t[info[2]]:.4g} s"
@@ -181,4 +187,29 @@ def _estimate(
         ended = f"{REASONS[int(info[1])]} at t = {record.t[failed]:.4g} s; the last estimate is held from there"
         status, note = "diverged", f"{note}; {ended}" if note else ended
     J = cost(model, record, X, D, inverse, alpha, R)
-    return Estimate(x=X, P=2.0 * S, d=D, J=J, status=status, note=note, report=report or None)
+    if not judge:
+        return Estimate(x=X, P=2.0 * S, d=D, J=J, status=status, note=note, report=report or None)
+    sampled = R[-1] / record.dt[-1]
+    system = None if failed is not None else _errors(model, record, X, S, inverse, sampled, S0, predicted)
+    report |= conditions(system, info[2] < 0, J, alpha)
+    return Estimate(x=X, P=2.0 * S, d=D, J=J, status=status, note=note, report=report)
+
+
+def _errors(
+    model: Model, record: Record, X: Array, S: Array, inverse: Array, R: Array, S0: Array, predicted: bool
+) -> ErrorSystem | None:
+    """The error system of a run, linearised at its estimates; R (outputs,) a sample's variance. None: not finite."""
+    n = X.shape[1]
+    nothing = np.zeros((n, n))
+    run = filtered(model, record, X[0], nothing, nothing, R, around=(X, X))
+    H = run.H
+    gains = np.where(np.isnan(record.y)[:, None, :], 0.0, 2.0 * S @ (H / R[:, None]).transpose(0, 2, 1))
+    if predicted:
+        # 2 [I + 2 S H' R^-1 H]^-1 S H' R^-1: what a sample of that weight does; the first one does nothing here.
+        try:
+            gains = np.linalg.solve(np.eye(n) + gains @ H, gains)
+        except np.linalg.LinAlgError:  # an indefinite S can make it singular
+            return None
+        gains[0] = 0.0
+    system = error_system(run.Phi, H, gains, R, inverse, 2.0 * S0, record.dt)
+    return system if all(np.isfinite(part).all() for part in (system.A, system.B, system.K, system.C)) else None

@@ -13,48 +13,9 @@ from suite.estimator import Estimate, Estimator
 from suite.model import Model
 from suite.prior import prior_of
 from suite.record import Record
+from suite.robustness import norm
 
 Array = npt.NDArray[np.float64]
-
-
-def threshold(F: Array, G: Array, C: Array, slowest: float = 0.0) -> float:
-    """The H-infinity norm of C (sI - F)^-1 G, by bisection on the Hamiltonian (Boyd, Balakrishnan, Kabamba 1989).
-
-    F (n, n), G (n, m), C (outputs, n). Where F is not stable the norm is infinite, and with `slowest` (rad/s) the
-    largest gain at frequencies above it is given instead.
-    """
-    n = len(F)
-
-    def gain(w: float) -> float:
-        return float(np.linalg.norm(C @ np.linalg.solve(1j * w * np.eye(n) - F, G.astype(complex)), 2))
-
-    eigenvalues = np.linalg.eigvals(F)
-    pace = float(np.max(np.abs(eigenvalues))) + 1e-12
-    if np.max(eigenvalues.real) >= -1e-9 * pace:
-        if slowest <= 0.0 or not G.size:
-            return float("inf") if G.size else 0.0
-        return max(gain(float(w)) for w in np.geomspace(slowest, max(1e3 * pace, 1e3 * slowest), 400))
-    low = max(gain(float(w)) for w in [0.0, *np.abs(eigenvalues)]) if G.size else 0.0
-    if low == 0.0:
-        return 0.0
-    high = 2.0 * low
-    while _crosses(F, G, C, high):
-        high *= 2.0
-    while high - low > 1e-10 * high:
-        middle = 0.5 * (low + high)
-        if _crosses(F, G, C, middle):
-            low = middle
-        else:
-            high = middle
-    return 0.5 * (low + high)
-
-
-def _crosses(F: Array, G: Array, C: Array, gamma: float) -> bool:
-    """Whether some frequency has the gain gamma: the Hamiltonian then has an eigenvalue on the imaginary axis."""
-    # G and C carry half of gamma each, which keeps the blocks of one size.
-    hamiltonian = np.block([[F, G @ G.T / gamma], [-C.T @ C / gamma, -F.T]])
-    eigenvalues = np.linalg.eigvals(hamiltonian)
-    return bool(np.any(np.abs(eigenvalues.real) < 1e-8 * np.max(np.abs(eigenvalues))))
 
 
 def _settings(
@@ -73,8 +34,8 @@ def _settings(
     H = model.output_jacobian(record.t[0], prior.x0, record.u[0])
     slowest = 2.0 * np.pi / float(record.t[-1] - record.t[0])
     C = H / np.sqrt(spectral)[:, None]
-    found = threshold(F, root, C)
-    scale = found if np.isfinite(found) else threshold(F, root, C, slowest)
+    found = norm(F, root, C)
+    scale = found if np.isfinite(found) else norm(F, root, C, slowest)
     chosen = gamma if gamma is not None else gamma_ratio * scale
     return (chosen if chosen > 0.0 else 1.0), found
 

@@ -9,11 +9,12 @@ from scipy.linalg import expm
 
 from estimators.conventional_ie import ConventionalIE, ConventionalIEDiscrete
 from estimators.generalized_ie import GeneralizedIE, GeneralizedIEDiscrete
-from estimators.sra import SemiRobustAdaptive, SemiRobustAdaptiveDiscrete, threshold
+from estimators.sra import SemiRobustAdaptive, SemiRobustAdaptiveDiscrete
 from suite.case import Case, Experiment
 from suite.filtering import filtered, rates
 from suite.model import Initial, Model, Output, Parameter
 from suite.record import Prior, Record
+from suite.robustness import norm
 
 # The plant of Raol (2016), (100)-(101).
 LINEAR = Model(
@@ -194,8 +195,8 @@ def test_without_measurements_the_filter_is_the_model(method: GeneralizedIE) -> 
 def test_the_threshold_of_the_published_plant(H: np.ndarray, expected: float) -> None:
     """The H-infinity norm of the paper's plant from d1 to both states, to x2, to x1, is 2.112, 1.564, 1.471."""
     F = LINEAR.jacobian(0.0, np.zeros(2))
-    assert threshold(F, np.array([[1.0], [0.0]]), H) == pytest.approx(expected, abs=1e-3)
-    assert threshold(np.array([[0.0]]), np.eye(1), np.eye(1)) == float("inf")
+    assert norm(F, np.array([[1.0], [0.0]]), H) == pytest.approx(expected, abs=1e-3)
+    assert norm(np.array([[0.0]]), np.eye(1), np.eye(1)) == float("inf")
 
 
 def test_sra_says_how_long_it_exists() -> None:
