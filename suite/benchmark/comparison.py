@@ -93,17 +93,35 @@ class Comparison:
 
     def by_seed(self, method: Method, at: Condition, metric: str = ERROR) -> dict[int, float]:
         """A method's scores under a condition by seed, infinite where it failed."""
-        table = self.rows.get(method) or self.references.get(method) or {}
-        return {row["seed"]: score(row, metric) for row in table.get(at, ())}
+        table = self._scores.setdefault((method, metric), {})
+        if at not in table:
+            table[at] = {row["seed"]: score(row, metric) for row in self.of(method).get(at, ())}
+        return table[at]
+
+    def of(self, method: Method) -> Mapping[Condition, Sequence[Row]]:
+        """The rows of a method or a reference by condition."""
+        return self.rows.get(method) or self.references.get(method) or {}
+
+    @cached_property
+    def _scores(self) -> dict[tuple[Method, str], dict[Condition, dict[int, float]]]:
+        """What `by_seed` has found so far."""
+        return {}
+
+    @cached_property
+    def _middles(self) -> dict[tuple[Method, str], Array]:
+        """Medians over seeds (conditions,) that were asked for so far."""
+        return {}
+
+    def _middle(self, method: Method, metric: str) -> Array:
+        if (method, metric) not in self._middles:
+            found = [self.by_seed(method, at, metric).values() for at in self.conditions]
+            self._middles[method, metric] = np.array([float(np.median(list(f) or [np.inf])) for f in found])
+        return self._middles[method, metric]
 
     def medians(self, methods: Sequence[Method], metric: str = ERROR) -> Array:
         """Median scores over seeds, (methods, conditions); infinite where half of the seeds failed or none was run."""
-        return np.array(
-            [
-                [float(np.median(list(self.by_seed(m, at, metric).values()) or [np.inf])) for at in self.conditions]
-                for m in methods
-            ]
-        ).reshape(len(methods), len(self.conditions))
+        found = np.array([self._middle(method, metric) for method in methods])
+        return found.reshape(len(methods), len(self.conditions))
 
     def ranks(self, methods: Sequence[Method]) -> Array:
         """Ranks of methods by state error, (methods, cases)."""
@@ -133,15 +151,15 @@ class Comparison:
     def counts(self, method: Method) -> dict[str, int]:
         """How its cells ended, by status, measured cases among them."""
         found: dict[str, int] = {}
-        for rows in (self.rows.get(method) or self.references.get(method) or {}).values():
+        for rows in self.of(method).values():
             for row in rows:
                 found[row["status"]] = found.get(row["status"], 0) + 1
         return found
 
     def median_of(self, method: Method, field: str) -> float | None:
         """Median of a number over the cells that ended well, infinities aside."""
-        table = self.rows.get(method) or self.references.get(method) or {}
-        values = [row[field] for rows in table.values() for row in rows if row["status"] == "ok" and field in row]
+        rows = [row for found in self.of(method).values() for row in found if row["status"] == "ok"]
+        values = [row[field] for row in rows if field in row]
         fine = [value for value in values if isinstance(value, (int, float)) and np.isfinite(value)]
         return float(np.median(fine)) if fine else None
 

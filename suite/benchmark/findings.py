@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from suite.benchmark.comparison import ERROR, FEW, Comparison, Condition, Method
+from suite.benchmark.comparison import ERROR, FEW, Comparison, Method
 from suite.benchmark.ranking import LEVEL, friedman, not_beaten
 from suite.benchmark.statistics import holm, signed_rank
 
@@ -178,21 +178,21 @@ def _breaks(c: Comparison) -> str:
 
 def winners(c: Comparison) -> list[dict[str, Any]]:
     """Under each condition the best filter, the best smoother and the best estimate of d, tuned or not as it came."""
+    filters, smoothers, every = c.methods(kind="filter"), c.methods(kind="smoother"), c.methods()
     return [
         {
             "case": at[0],
             "noise": at[1],
-            "filter": _best(c, c.methods(kind="filter"), at, ERROR),
-            "smoother": _best(c, c.methods(kind="smoother"), at, ERROR),
-            "model_error": _best(c, c.methods(), at, "d_nrmse"),
+            "filter": _best(c, filters, j, ERROR),
+            "smoother": _best(c, smoothers, j, ERROR),
+            "model_error": _best(c, every, j, "d_nrmse"),
         }
-        for at in c.conditions
+        for j, at in enumerate(c.conditions)
     ]
 
 
-def _best(c: Comparison, methods: Sequence[Method], at: Condition, metric: str) -> tuple[Method, float] | None:
-    found = [(float(np.median(list(c.by_seed(m, at, metric).values()) or [np.inf])), m) for m in methods]
-    if not found:
+def _best(c: Comparison, methods: Sequence[Method], j: int, metric: str) -> tuple[Method, float] | None:
+    values = c.medians(methods, metric)[:, j]
+    if not np.isfinite(values).any():
         return None
-    value, method = min(found, key=lambda pair: pair[0])
-    return (method, value) if np.isfinite(value) else None
+    return methods[int(np.argmin(values))], float(values.min())

@@ -61,7 +61,7 @@ def matrix(c: Comparison, variant: str) -> Matrix | None:
 
 
 def _square(c: Comparison, method: Method, at: Condition, best: bool) -> Square:
-    rows = (c.rows.get(method) or c.references.get(method) or {}).get(at, ())
+    rows = c.of(method).get(at, ())
     if not rows:
         return Square("", title="not run")
     ended = Counter(row["status"] for row in rows)

@@ -21,7 +21,7 @@ from suite.errors import InputError
 from suite.files import writable_folder, write_whole
 from suite.report import bench_cases, bench_consistency, bench_origin, bench_ranking, bench_sensitivity
 from suite.report.bench_figures import STYLE
-from suite.report.bench_matrix import as_rows, matrix, scale
+from suite.report.bench_matrix import Matrix, as_rows, matrix, scale
 from suite.report.vector import share_letters, svg
 
 Row = Mapping[str, Any]
@@ -42,12 +42,13 @@ def write(rows: Sequence[Row], tunings: Sequence[Mapping[str, Any]], folder: Pat
     figures |= {f"case-{p.case}": p.figure for p in pictures if p.figure is not None}
     drawn = {name: svg(figure, name) for name, figure in figures.items()}
     for name, text in drawn.items():
-        alone = text.replace("<svg ", '<svg xmlns="http://www.w3.org/2000/svg" ', 1)
-        write_whole(folder / "figures" / f"{name}.svg", alone if "xmlns=" not in text.split(">", 1)[0] else text)
+        write_whole(folder / "figures" / f"{name}.svg", text)
     sentences = findings.verdict(c)
-    write_whole(folder / "report.html", _page(c, rows, sentences, pictures, drawn, figures, store))
+    matrices = [found for variant in ("tuned", "default") if (found := matrix(c, variant)) is not None]
+    write_whole(folder / "report.html", _page(c, rows, sentences, matrices, pictures, drawn, figures, store))
     files = [folder / "report.html", *(folder / "figures" / f"{name}.svg" for name in drawn)]
-    return {"verdict": sentences, "files": [str(path) for path in (*files, *_tables(c, rows, points, folder))]}
+    files += _tables(c, rows, matrices, points, folder)
+    return {"verdict": sentences, "files": [str(path) for path in files]}
 
 
 def _figures(c: Comparison, points: Sequence[Mapping[str, Any]]) -> dict[str, Figure | None]:
@@ -64,14 +65,16 @@ def _figures(c: Comparison, points: Sequence[Mapping[str, Any]]) -> dict[str, Fi
         }
 
 
-def _tables(c: Comparison, rows: Sequence[Row], points: Sequence[Row], folder: Path) -> list[Path]:
+def _tables(
+    c: Comparison, rows: Sequence[Row], matrices: Sequence[Matrix], points: Sequence[Row], folder: Path
+) -> list[Path]:
     """The tables behind the page; those that are empty are left out."""
-    matrices = [found for variant in ("tuned", "default") if (found := matrix(c, variant)) is not None]
+    summary = table.lines(rows)
     lines = {tuple(sorted(line.items(), key=str)): line for found in matrices for line in as_rows(found, c)}
     wanted: dict[str, Sequence[Row]] = {
         "rows.parquet": rows,
-        "summary.csv": table.lines(rows),
-        "summary.parquet": table.lines(rows),
+        "summary.csv": summary,
+        "summary.parquet": summary,
         "methods.csv": methods(c),
         "matrix.csv": list(lines.values()),
         "failures.csv": bench_origin.failures(rows),
@@ -109,10 +112,9 @@ def methods(c: Comparison) -> list[dict[str, Any]]:
 
 def _share(c: Comparison, method: Method) -> float | None:
     """How often the shape of the missing effect was recognised, of the cells where that was asked."""
-    tables = c.rows.get(method) or c.references.get(method) or {}
     hits = [
         row["named"]
-        for rows in tables.values()
+        for rows in c.of(method).values()
         for row in rows
         if row["status"] == "ok" and row.get("named") is not None
     ]
@@ -123,6 +125,7 @@ def _page(
     c: Comparison,
     rows: Sequence[Row],
     sentences: Sequence[str],
+    matrices: Sequence[Matrix],
     pictures: Sequence[bench_cases.Picture],
     drawn: Mapping[str, str],
     figures: Mapping[str, Figure],
@@ -143,7 +146,7 @@ def _page(
     first, last = bench_origin.dates(rows)
     return environment.get_template("bench.html.j2").render(
         sentences=sentences,
-        matrices=[found for variant in ("tuned", "default") if (found := matrix(c, variant)) is not None],
+        matrices=matrices,
         variants=bench_ranking.VARIANTS,
         scale=scale(),
         figures={name: Markup(text) for name, text in shared.items()},
