@@ -54,14 +54,14 @@ def test_the_bound_is_the_error_of_the_best_linear_estimate(kind: str) -> None:
 
 
 def test_the_oracle_meets_the_bound_and_no_estimator_beats_it() -> None:
-    """Mean squares over 40 seeds: the oracle's within 20 % of the bound (from above, less its scatter), the EKF's
+    """Mean squares over 25 seeds: the oracle's within 20 % of the bound (from above, less its scatter), the EKF's
     more.
     """
     bound = row("posterior-crb", CASE, 0.1, 0)["state_nrmse"]
     smooth = row("posterior-crb-smoother", CASE, 0.1, 0)["state_nrmse"]
     assert smooth < bound
     found = {
-        name: [row(name, CASE, 0.1, seed)["state_nrmse"] for seed in range(40)]
+        name: [row(name, CASE, 0.1, seed)["state_nrmse"] for seed in range(25)]
         for name in ("oracle", "oracle-smoother")
     }
     assert 0.85 < np.sqrt(np.mean(np.square(found["oracle"]))) / bound < 1.2
@@ -111,6 +111,7 @@ def test_the_oracle_knows_the_state_that_the_model_lacks() -> None:
     plain = cells.run(cells.Cell("bouc-wen", 0.05, "ekf", "default", 0), {}, None)
     assert found["state_nrmse"] < 0.2 * plain["state_nrmse"]
     assert found["d_nrmse"] < 0.05
+    assert "parameter_worst" not in found
 
 
 def test_references_stand_in_the_matrix_and_apart() -> None:

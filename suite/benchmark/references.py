@@ -66,10 +66,10 @@ class Oracle(Reference):
         status, note = ("ok", "") if run.failed_at is None else ("diverged", "the filter of the true model diverged")
         estimate = Estimate(x=x[:, kept], P=P[:, kept[:, None], kept], d=d, status=status, note=note)
         row = metrics.judge(case, record, truth, estimate, self.kind)
-        if model.outputs != case.deficient.outputs:
-            # The deficient model's sensors are not those that the oracle reads.
-            row.pop("nis", None)
-        return row
+        # It was told the coefficients, and the deficient model's sensors may not be those that it reads.
+        given = {"parameters", "parameter_error", "parameter_worst", "named", "named_as"}
+        given |= {"nis"} if model.outputs != case.deficient.outputs else set()
+        return {key: value for key, value in row.items() if key not in given}
 
 
 class OracleSmoother(Oracle):
