@@ -68,6 +68,7 @@ class CKF(Estimator):
 
     name = "ckf"
     tuning = {"q_scale": (1e-4, 1e4, "log")}
+    optimal = "white noise"
 
     def estimate(self, model: Model, record: Record, q_scale: float = 1.0) -> Estimate:
         return alone(cubature, model, record, q_scale)

@@ -17,6 +17,7 @@ class CKFDisturbance(Estimator):
 
     name = "ckf-disturbance"
     tuning = {"q_scale": (1e-4, 1e4, "log")}
+    optimal = "random walk"
 
     def estimate(self, model: Model, record: Record, q_scale: float = 1.0) -> Estimate:
         return with_disturbance(cubature, model, record, q_scale)

@@ -16,6 +16,7 @@ class EKF(Estimator):
 
     name = "ekf"
     tuning = {"q_scale": (1e-4, 1e4, "log")}
+    optimal = "white noise"
 
     def estimate(self, model: Model, record: Record, q_scale: float = 1.0) -> Estimate:
         return alone(extended, model, record, q_scale)

@@ -16,6 +16,7 @@ class EKFDisturbance(Estimator):
 
     name = "ekf-disturbance"
     tuning = {"q_scale": (1e-4, 1e4, "log")}
+    optimal = "random walk"
 
     def estimate(self, model: Model, record: Record, q_scale: float = 1.0) -> Estimate:
         return with_disturbance(extended, model, record, q_scale)

@@ -51,6 +51,7 @@ class EKFSmoother(Estimator):
     name = "ekf-rts"
     kind: ClassVar[Literal["filter", "smoother"]] = "smoother"
     tuning = {"q_scale": (1e-4, 1e4, "log")}
+    optimal = "white noise"
 
     def estimate(self, model: Model, record: Record, q_scale: float = 1.0) -> Estimate:
         return alone(extended_smoother, model, record, q_scale)

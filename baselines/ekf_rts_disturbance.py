@@ -20,6 +20,7 @@ class EKFSmootherDisturbance(Estimator):
     name = "ekf-rts-disturbance"
     kind: ClassVar[Literal["filter", "smoother"]] = "smoother"
     tuning = {"q_scale": (1e-4, 1e4, "log")}
+    optimal = "random walk"
 
     def estimate(self, model: Model, record: Record, q_scale: float = 1.0) -> Estimate:
         return with_disturbance(extended_smoother, model, record, q_scale)

@@ -59,6 +59,7 @@ class SquareRootEKF(Estimator):
 
     name = "square-root-ekf"
     tuning = {"q_scale": (1e-4, 1e4, "log")}
+    optimal = "white noise"
 
     def estimate(self, model: Model, record: Record, q_scale: float = 1.0) -> Estimate:
         return alone(square_root, model, record, q_scale)

@@ -17,6 +17,7 @@ class SquareRootEKFDisturbance(Estimator):
 
     name = "square-root-ekf-disturbance"
     tuning = {"q_scale": (1e-4, 1e4, "log")}
+    optimal = "random walk"
 
     def estimate(self, model: Model, record: Record, q_scale: float = 1.0) -> Estimate:
         return with_disturbance(square_root, model, record, q_scale)

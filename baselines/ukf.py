@@ -16,6 +16,7 @@ class UKF(Estimator):
 
     name = "ukf"
     tuning = {"q_scale": (1e-4, 1e4, "log")}
+    optimal = "white noise"
 
     def estimate(self, model: Model, record: Record, q_scale: float = 1.0) -> Estimate:
         return alone(unscented, model, record, q_scale)

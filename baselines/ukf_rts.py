@@ -45,6 +45,7 @@ class UKFSmoother(Estimator):
     name = "ukf-rts"
     kind: ClassVar[Literal["filter", "smoother"]] = "smoother"
     tuning = {"q_scale": (1e-4, 1e4, "log")}
+    optimal = "white noise"
 
     def estimate(self, model: Model, record: Record, q_scale: float = 1.0) -> Estimate:
         return alone(unscented_smoother, model, record, q_scale)

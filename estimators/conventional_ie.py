@@ -31,6 +31,7 @@ class ConventionalIEDiscrete(Estimator):
 
     name = "conventional-ie-discrete"
     tuning = {"q_scale": (1e-4, 1e6, "log")}
+    optimal = "white noise"
 
     def estimate(
         self, model: Model, record: Record, q_scale: float = 1.0, **options: Unpack[DiscreteOptions]

@@ -18,6 +18,7 @@ class RandomWalkFilter(Estimator):
 
     name = "random-walk-filter"
     tuning = {"q_scale": (1e-4, 1e4, "log")}
+    optimal = "random walk"
 
     def estimate(self, model: Model, record: Record, q_scale: float = 1.0) -> Estimate:
         return disturbed(with_random_walk, model, record, q_scale, smooth=False)

@@ -24,6 +24,7 @@ class RandomWalkSmoother(Estimator):
     name = "random-walk-smoother"
     kind = "smoother"
     tuning = {"q_scale": (1e-4, 1e4, "log")}
+    optimal = "random walk"
 
     def estimate(self, model: Model, record: Record, q_scale: float = 1.0) -> Estimate:
         prior = prior_of(record)

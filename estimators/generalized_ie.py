@@ -45,6 +45,7 @@ class GeneralizedIEDiscrete(Estimator):
 
     name = "generalized-ie-discrete"
     tuning = {"alpha": (1e-4, 1e6, "log")}
+    optimal = "white noise"
 
     def estimate(
         self, model: Model, record: Record, alpha: float = 1.0, q_scale: float = 1.0, **options: Unpack[DiscreteOptions]

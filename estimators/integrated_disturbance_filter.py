@@ -19,6 +19,7 @@ class IntegratedWalkFilter(Estimator):
 
     name = "integrated-walk-filter"
     tuning = {"q_scale": (1e-6, 1e6, "log")}
+    optimal = "integrated walk"
 
     def estimate(self, model: Model, record: Record, q_scale: float = 1.0) -> Estimate:
         return disturbed(with_integrated_walk, model, record, q_scale, smooth=False)

@@ -20,6 +20,7 @@ class IntegratedWalkSmoother(Estimator):
     name = "integrated-walk-smoother"
     kind = "smoother"
     tuning = {"q_scale": (1e-6, 1e6, "log")}
+    optimal = "integrated walk"
 
     def estimate(self, model: Model, record: Record, q_scale: float = 1.0) -> Estimate:
         return disturbed(with_integrated_walk, model, record, q_scale, smooth=True)

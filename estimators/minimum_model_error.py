@@ -33,6 +33,7 @@ class MinimumModelError(Estimator):
     name = "minimum-model-error"
     kind = "smoother"
     tuning = {"alpha": (1e-4, 1e6, "log")}
+    optimal = "white noise"
 
     def estimate(
         self, model: Model, record: Record, alpha: float = 1.0, q_scale: float = 1.0, Q: Array | None = None

@@ -55,7 +55,7 @@ class Estimator(abc.ABC):
     kind: ClassVar[Literal["filter", "smoother"]] = "filter"
     tuning: ClassVar[Mapping[str, Range]] = {}
     optimal: ClassVar[Literal["white noise", "random walk", "integrated walk"] | None] = None
-    optimal_within: ClassVar[float] = 1e-4
+    optimal_within: ClassVar[float] = 1e-3
 
     @abc.abstractmethod
     def estimate(self, model: Model, record: Record, *args: Any, **kwargs: Any) -> Estimate:

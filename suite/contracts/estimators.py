@@ -59,17 +59,17 @@ def repeats(estimator: Estimator) -> str:
 
 def missing_samples(estimator: Estimator) -> str:
     """A third of the samples missing, the last among them."""
-    return how(_two_states(estimator, plants.without_samples))
+    return _as_well_as_whole(estimator, plants.without_samples)
 
 
 def missing_channels(estimator: Estimator) -> str:
     """Each channel with gaps of its own, no sample complete but a few."""
-    return how(_two_states(estimator, plants.by_channel))
+    return _as_well_as_whole(estimator, plants.by_channel)
 
 
 def irregular_steps(estimator: Estimator) -> str:
     """Steps of unequal length."""
-    return how(_two_states(estimator, plants.irregular))
+    return _as_well_as_whole(estimator, plants.irregular)
 
 
 def short_records(estimator: Estimator) -> str:
@@ -172,6 +172,13 @@ def covariance(estimator: Estimator) -> str:
 def _two_states(estimator: Estimator, change: Callable[[Record, Model], Record]) -> Estimate:
     record = plants.record(plants.LINEAR, plants.HARDENING)
     return estimated(estimator, plants.LINEAR, change(record, plants.LINEAR))
+
+
+def _as_well_as_whole(estimator: Estimator, change: Callable[[Record, Model], Record]) -> str:
+    """How a run on a changed record ended; one that breaks where the whole record does no harm is no honest failure."""
+    whole, found = _two_states(estimator, lambda record, _: record), _two_states(estimator, change)
+    demand(found.status == "ok" or whole.status != "ok", f"the whole record does no harm, but this one {how(found)}")
+    return how(found)
 
 
 CHECKS: dict[str, Callable[[Estimator], str]] = {
