@@ -112,7 +112,7 @@ def _run(args: argparse.Namespace) -> int:
     cells = matrix.chosen(chosen, args.only, args.seeds, args.data, args.estimators)
     how = matrix.Running(
         jobs=args.jobs, limit=chosen.limit, memory=args.memory or chosen.memory, data=args.data, force=args.force,
-        dask=args.dask,
+        dask=args.dask, tuned_at=chosen.tuned_at,
     )  # fmt: skip
     with Store(args.store) as store:
         done = matrix.run(cells, store, how, tune_only=args.bench == "tune")

@@ -67,7 +67,7 @@ def _runs(data: Path | None) -> dict[str, int]:
 @dataclass(frozen=True)
 class Running:
     """How cells are run: `jobs` processes here or the Dask cluster at an address; `limit` in seconds and `memory` in
-    MiB are of one cell; `force` runs again what is stored.
+    MiB are of one cell; `force` runs again what is stored; `tuned_at` as in a plan.
     """
 
     jobs: int | None = None
@@ -77,6 +77,7 @@ class Running:
     force: bool = False
     quiet: bool = False
     dask: str | None = None
+    tuned_at: float | None = None
 
     def results(self, tasks: Iterator[Task | None], limit: float) -> Iterator[tuple[Task, Any]]:
         """Each task with its result or Failure, as they finish."""
@@ -87,7 +88,7 @@ class Running:
 
 def run(cells: Sequence[Cell], store: Store, how: Running, *, tune_only: bool = False) -> dict[str, Any]:
     """Run what is not in the store yet (or all, with `force`); counts by status, and how many were still good."""
-    keys, since = Keys(how.data), time.time() if how.force else 0.0
+    keys, since = Keys(how.data, how.tuned_at), time.time() if how.force else 0.0
     stored = {} if how.force else store.keys()
     fresh = [cell for cell in cells if tune_only or stored.get(cell) != keys.cell(cell)]
     with Reservations(store) as held:
@@ -128,7 +129,7 @@ def run(cells: Sequence[Cell], store: Store, how: Running, *, tune_only: bool = 
 
 def _tune(cells: Sequence[Cell], store: Store, keys: Keys, how: Running, held: Reservations, since: float) -> int:
     """Find the tuned values that are not stored; where tuning failed they are {}, the defaults. How many are wanted."""
-    wanted = dict.fromkeys((c.case, c.noise, c.estimator) for c in cells if c.variant == "tuned")
+    wanted = dict.fromkeys((c.case, keys.tuning_noise(c.noise), c.estimator) for c in cells if c.variant == "tuned")
     by_key = {keys.tuning(*entry): entry for entry in wanted}
     fresh = {key: entry for key, entry in by_key.items() if store.tuning(key, since) is None}
 

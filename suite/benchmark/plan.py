@@ -12,6 +12,7 @@ from typing import Any
 
 from suite import plugins
 from suite.benchmark import grids, references
+from suite.benchmark import rules as limits
 from suite.benchmark.cells import Cell
 from suite.benchmark.conditions import CONDITIONS, inapplicable
 from suite.benchmark.recovery import OURS, RIVALS
@@ -31,6 +32,8 @@ class Plan:
     `seeds` counts the judged seeds 0..seeds-1 of simulated cases; `limit` is the time-out of one cell in seconds,
     `memory` what it may take in MiB. An entry of `estimators` may be a grid, `ekf[q_scale=0.1,1,10]` (see grids).
     `exclude` are patterns of cases left out; with `tags` a case must have one of them; `most_states` bounds its size.
+    `tuned_at` is the noise level at which tuned values are found for all levels, left out: each level has its own;
+    `rules` keep expensive methods within the time of the plan.
 
     Kind "estimation" judges estimates of states and model error. Kind "recovery" judges whether a method names what is
     missing: its `estimators` are the methods, its `variants` the conditions, `seeds_of` the seeds of a condition or
@@ -52,6 +55,8 @@ class Plan:
     most_states: int | None = None
     seeds_of: Mapping[str, int] = field(default_factory=dict)
     rival_variants: tuple[str, ...] = CONDITIONS
+    tuned_at: float | None = None
+    rules: tuple[limits.Rule, ...] = ()
 
     def cells(self, runs: dict[str, int] | None = None) -> list[Cell]:
         """Every cell. A measured case (noise 0, as it is) is judged untuned, once a run: `runs` by case, else one."""
@@ -72,6 +77,7 @@ class Plan:
                         if variant == "tuned" and (measured or not estimators[name].tuning):
                             continue
                         count = (runs or {}).get(case.name, 1) if measured else self.seeds
+                        count = limits.allowed(self.rules, name, variant, len(case.deficient.states), count)
                         cells += [Cell(case.name, noise, name, variant, seed) for seed in range(count)]
         return cells
 
@@ -143,13 +149,15 @@ def parse(table: dict[str, Any], name: str, source: str) -> Plan:
         "most_states": (int, "a whole number"),
         "seeds_of": (dict, "a table of seeds by condition or method"),
         "rival_variants": (list, "a list of conditions"),
+        "tuned_at": ((int, float), "a fraction"),
+        "rules": (list, "tables [[rules]]"),
     }
     for key, value in table.items():
         if key not in kinds:
             raise InputError(f"{source}: {key!r} is not an entry of a plan; it may have {', '.join(kinds)}")
         if not isinstance(value, kinds[key][0]) or isinstance(value, bool):
             raise InputError(f"{source}: {key} = {value!r}; expected {kinds[key][1]}")
-        inner: Any = (int, float) if key == "noises" else str
+        inner: Any = {"noises": (int, float), "rules": dict}.get(key, str)
         if isinstance(value, list) and not all(isinstance(item, inner) for item in value):
             raise InputError(f"{source}: {key} = {value!r}; expected {kinds[key][1]}")
     if table.get("kind", "estimation") not in KINDS:
@@ -165,9 +173,10 @@ def parse(table: dict[str, Any], name: str, source: str) -> Plan:
     ):
         raise InputError(f"{source}: seeds_of = {counts!r}; expected whole numbers by condition or method")
     positive = table.get("seeds", 1) >= 1 and min(table.get("limit", 1), table.get("memory", 1)) > 0
-    if not positive or min(table.get("noises", [0]), default=0) < 0:
+    if not positive or min(*table.get("noises", [0]), table.get("tuned_at", 0), 0) < 0:
         raise InputError(f"{source}: seeds, limit and memory must be positive, noises not negative; mend the plan")
     if recovery:
         table = {"variants": list(CONDITIONS), **table}
     grown: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}
+    grown["rules"] = limits.parse(table.get("rules", []), VARIANTS, source)
     return Plan(name, **{"sentence": "", **grown})
