@@ -93,8 +93,8 @@ class _Reader:
         if not math.isfinite(value):
             shown = text if len(text) <= 40 else text[:37] + "..."
             mend = "correct it, or leave the cell empty if it is missing"
-            raise self.refuse(at, f"column {name}: expected a number, got {shown!r}", mend)
+            raise self.refuse(at, f"expected a number, got {shown!r}", mend, f", column {name}")
         return value
 
-    def refuse(self, at: int, what: str, mend: str) -> DataError:
-        return DataError(f"{self.source}, line {at}: {what}; {mend}")
+    def refuse(self, at: int, what: str, mend: str, column: str = "") -> DataError:
+        return DataError(f"{self.source}, line {at}{column}: {what}; {mend}")

@@ -49,7 +49,7 @@ def test_the_norm_of_a_run_is_that_of_the_dense_error_system() -> None:
     run = filtered(LINEAR, record, prior.x0, prior.P0, prior.Q, prior.R)
 
     def outputs(first: np.ndarray, d: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """R^-1/2 H e, e the error of the gains of the run, driven by a first error, by d1 (N,) and by noise v (N, 2)."""
+        """R^-1/2 H e, e the error with the gains of the run, for a first error, d1 (N,) and noise v (N, 2)."""
         e, rows = first, []
         for k in range(N):
             if k > 0:
