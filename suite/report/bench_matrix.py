@@ -97,8 +97,10 @@ def color(ratio: float) -> tuple[str, bool]:
     """
     share = 0.5 + 0.5 * float(np.clip(np.log2(max(ratio, 1e-9)) / SPAN, -1.0, 1.0))
     rgba: Any = colormaps["PuOr_r"](0.06 + 0.88 * share)
-    luminance = 0.2126 * rgba[0] + 0.7152 * rgba[1] + 0.0722 * rgba[2]
-    return to_hex(rgba), luminance < 0.42
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in rgba[:3]]
+    luminance = float(np.dot(linear, [0.2126, 0.7152, 0.0722]))
+    # Where the contrasts of white and of black are equal (WCAG 2), 4.6 each.
+    return to_hex(rgba), luminance + 0.05 < np.sqrt(1.05 * 0.05)
 
 
 def scale() -> list[tuple[str, str, bool]]:
