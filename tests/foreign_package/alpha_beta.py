@@ -20,10 +20,10 @@ class AlphaBeta(Estimator):
             t, u = float(record.t[k]), tuple(record.u[k])
             dt = float(record.t[max(k, 1)] - record.t[max(k, 1) - 1])
             if k > 0:
-                x, F = model.transition(float(record.t[k - 1]), x, tuple(record.u[k - 1]), dt, u)
+                x = model.step(float(record.t[k - 1]), x, tuple(record.u[k - 1]), dt, u)
             seen = ~np.isnan(record.y[k])
             H = model.output_jacobian(t, x, u)[seen]
-            # The least change of position and speed that moves the outputs by a share of the residual.
+            # The least change of the state that moves the outputs by a share of the residual.
             shift = gain * np.linalg.pinv(H) @ (record.y[k] - model.output(t, x, u))[seen]
             x = x + shift
             xs[k], d[k] = x, shift / dt
