@@ -90,10 +90,10 @@ def _named(name: str) -> list[Line | tuple[str, str, Any]]:
         return _in_file(Path(name))
     found: list[Line | tuple[str, str, Any]] = []
     for kind in CHECKED:
-        entry = plugins.find(kind)
-        if name in entry.loaded:
-            found.append((kind, name, entry.loaded[name]))
-        for label, reason in entry.failed.items():
+        if name in plugins.find(kind).loaded:
+            found.append((kind, name, plugins.find(kind).loaded[name]))
+    for kind in CHECKED if not found else ():
+        for label, reason in plugins.find(kind).failed.items():
             if name == label or _spelled(name) in _words(label):
                 found.append(Line(kind, label, "loads", "failed", reason))
     if not found:
