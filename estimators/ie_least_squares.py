@@ -23,9 +23,11 @@ FEW = 12  # terms up to which the states of an equation are candidates beside a 
 
 def candidates(model: Model) -> dict[str, list[str]]:
     """Where nothing is named: a constant in each suspected equation, and in small models the states it depends on."""
-    names = {expressions.symbol(name): name for name in model.states}
     rates = dict(zip(model.states, model.rates, strict=True))
-    found = {s: ["1", *sorted(names[x] for x in rates[s].free_symbols & names.keys())] for s in model.suspects}
+    found = {
+        s: ["1", *(x for x in sorted(model.states) if expressions.symbol(x) in rates[s].free_symbols)]
+        for s in model.suspects
+    }
     return found if sum(map(len, found.values())) <= FEW else {s: ["1"] for s in model.suspects}
 
 

@@ -49,7 +49,7 @@ class LeastSquares:
     def add(self, t: float, u: Array, y: Array) -> None:
         """Take the sample at time t, inputs u (inputs,), outputs y (outputs,), NaN where missing."""
         run = self.filter
-        if t > self._t and not all(map(math.isnan, y.tolist())):
+        if t > self._t and any(e == e for e in y.tolist()):
             forget(math.exp((t - self._t) / self._memory), self._most, self._count, SPREAD, run.x, run.P)
         self._t = t
         run.add(t, u, y)

@@ -8,7 +8,7 @@ gives d. One with the suspected effect added gives its coefficients, by recursiv
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -29,8 +29,7 @@ Array = npt.NDArray[np.float64]
 FALSE_ALARMS = 1e-5  # a sample
 
 
-@dataclass(frozen=True)
-class Reading:
+class Reading(NamedTuple):
     """What is known after a sample. Standard deviations are those of the filters, in the unit of their number.
 
     innovation (outputs,) over its sd, NaN where not measured; d, d_sd (suspects,) in rate units; coefficients,

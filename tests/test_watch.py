@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from suite.alarm import A, B, CLIP, Alarm, limit_for
+from suite.alarm import Alarm
 from suite.errors import DataError
 from suite.filtering import filtered
 from suite.model import Initial, Model, Output, Parameter
@@ -83,8 +83,13 @@ def test_the_alarm_comes_at_its_stated_rate_on_noise(channels: int) -> None:
 
 
 def test_one_outlier_raises_no_alarm() -> None:
-    """A single innovation of a thousand sd counts as CLIP sd: at any rate below 1e-3 that is not enough."""
-    assert A * CLIP**2 - B < limit_for(1e3)
+    """A single innovation of a thousand sd does not, at a rate of 1e-3; eight of 4 sd in a row do."""
+    alarm = Alarm(1e-3, 1)
+    alarm.add(0.0, np.array([1e3]))
+    assert alarm.since is None
+    for k in range(8):
+        alarm.add(1.0 + k, np.array([4.0]))
+    assert alarm.since == 0.0
 
 
 def test_null_records_raise_alarms_at_the_stated_rate() -> None:
