@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator
 
 from suite import plugins
 from suite.report.bench_figures import GREY
@@ -94,6 +94,7 @@ def _panel(ax: Axes, estimator: str, name: str, lines: Sequence[Mapping[str, Any
     low, high = (f(line[name] for line in lines) for f in (min, max))
     if log:
         ax.set_xscale("log")
+        ax.xaxis.set_major_locator(LogLocator(numticks=5))
         ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     ax.set_yscale("log")
     ax.set_ylim(0.9, WORST * 1.3)
