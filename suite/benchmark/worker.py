@@ -147,7 +147,8 @@ def _serve(pipe: Connection) -> None:
     with contextlib.suppress(KeyboardInterrupt, EOFError, BrokenPipeError, ConnectionResetError):
         importlib.import_module("suite.benchmark.cells")
         # Not in the first task's time: the plug-ins and their models take seconds to build.
-        plugins.estimators(), plugins.cases()
+        plugins.estimators()
+        plugins.cases()
         pipe.send(None)
         while True:
             function, arguments = pipe.recv()
