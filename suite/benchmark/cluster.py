@@ -93,10 +93,10 @@ def _results(
                 time.sleep(WATCH)
                 continue
             try:
-                done = wait(list(sent), timeout=WATCH if more else None, return_when="FIRST_COMPLETED").done
+                finished: Any = wait(list(sent), timeout=WATCH if more else None, return_when="FIRST_COMPLETED")
             except TimeoutError:
                 continue
-            for future in done:
+            for future in finished.done:
                 task = sent.pop(future)
                 yield task, _outcome(future, address)
                 future.release()
