@@ -19,6 +19,6 @@ CASE = Case(
     deficient=DEFICIENT,
     truth=PLANT,
     experiment=Experiment(300.0, 1.0, (0.99, 0.01, 0.0), every={"R": 7}),
-    missing=(Missing("linear_coupling", "S", {"a": 0.012}), Missing("linear_term", "R", {"a": 0.012})),
-    tags=("population", "pair"),
+    missing=(Missing("transfer", "S", {"a": 0.012}),),
+    tags=("population",),
 )

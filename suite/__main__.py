@@ -60,6 +60,7 @@ def parser() -> argparse.ArgumentParser:
     verb.add_argument("model", type=Path, metavar="MODEL", help="model file (TOML)")
     verb.add_argument("effect", metavar="EFFECT", help="an effect of `unmodelled list`")
     verb.add_argument("--equation", metavar="NAME", help="the state in whose rate it acts, where there is a choice")
+    verb.add_argument("--term", metavar="TEXT", help="the term, where the effect has several there")
     verb.add_argument("--data", type=Path, nargs="+", default=[], metavar="DATA", help="refit to these data")
     verb.add_argument("-o", "--output", type=Path, required=True, metavar="NEW.toml", help="file to write")
     verb = verbs.add_parser(
@@ -73,6 +74,7 @@ def parser() -> argparse.ArgumentParser:
     verb.add_argument("data", metavar="DATA", help="a CSV file, or - for lines on standard input as they come")
     verb.add_argument("--effect", metavar="ID", help="follow the coefficients of this effect of `unmodelled list`")
     verb.add_argument("--equation", metavar="NAME", help="the state in whose rate it acts, where there is a choice")
+    verb.add_argument("--term", metavar="TEXT", help="the term, where the effect has several there")
     verb.add_argument("--memory", type=float, metavar="TIME", help="how long the past counts, default 200 samples")
     verb.add_argument("--false-alarms", type=float, metavar="RATE", help="a sample of a right model, default 1e-5")
     verb.add_argument("--first", type=int, metavar="N", help="samples to set up on, default 40, or 200 without sigma")

@@ -148,7 +148,7 @@ def add(args: argparse.Namespace) -> int:
         raise InputError(
             f"no effect {args.effect!r}; {f'did you mean {close[0]}? ' if close else ''}see `unmodelled list`"
         )
-    term = chosen_term(model, args.effect, args.equation)
+    term = chosen_term(model, args.effect, args.equation, args.term)
     record = read_record(args.data, model) if args.data else None
     start = start_numbers(model, term, record)
     new = grown(model, [term], [start])
@@ -162,7 +162,7 @@ def add(args: argparse.Namespace) -> int:
         return _json(
             {
                 "file": str(args.output),
-                "term": term.text,
+                "term": term.shown,
                 "equation": term.equation,
                 "coefficients": values,
                 "diff": diff,
@@ -172,7 +172,7 @@ def add(args: argparse.Namespace) -> int:
     return 0
 
 
-def chosen_term(model: Model, effect: str, equation: str | None) -> Term:
+def chosen_term(model: Model, effect: str, equation: str | None, text: str | None = None) -> Term:
     """The one candidate that is meant; where several are, the sentence names them."""
     places = [*model.states, *model.outputs, *model.inputs]
     if equation is not None and equation not in places:
@@ -188,7 +188,12 @@ def chosen_term(model: Model, effect: str, equation: str | None) -> Term:
     equations = sorted({t.equation for t in terms})
     if len(equations) > 1:
         raise InputError(f"{effect} could act in {', '.join(equations)}; choose with --equation")
-    return terms[0]
+    texts = [t.text for t in terms]
+    if text is not None and text not in texts:
+        raise InputError(f"--term {text!r}: {effect} in {equations[0]} is {' or '.join(texts)}")
+    if text is None and len(texts) > 1:
+        raise InputError(f"{effect} in {equations[0]} could be {' or '.join(texts)}; choose with --term")
+    return terms[texts.index(text) if text else 0]
 
 
 def start_numbers(model: Model, term: Term, record: Record | None) -> Mapping[str, Parameter]:

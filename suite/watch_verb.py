@@ -114,7 +114,7 @@ def _effect(args: argparse.Namespace, model: Model, record: Record) -> tuple[Mod
     from suite.discovery.terms import grown
     from suite.verbs import chosen_term, start_numbers
 
-    term = chosen_term(model, args.effect, args.equation)
+    term = chosen_term(model, args.effect, args.equation, args.term)
     if term.effect.pinned or term.states or "__" in term.text:
         kind = "brings a state of its own" if term.states else "has no coefficient that multiplies it"
         raise InputError(f"--effect {args.effect}: it {kind}, so it cannot be followed; choose another, or none for d")

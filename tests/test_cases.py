@@ -108,6 +108,10 @@ def test_the_model_error_is_the_missing_terms(name: str) -> None:
             gap = case.truth.rate(record.t[k], truth.x[k], record.u[k]) - truth.d[k]
             wanted = case.deficient.rate(record.t[k], truth.x[k], record.u[k])
             np.testing.assert_allclose(gap, wanted, rtol=1e-9, atol=1e-12)
+    if any(missing.effect == "transfer" for missing in case.missing):
+        # What enters one store leaves another.
+        hit |= {state for i, state in enumerate(case.deficient.states) if np.any(truth.d[:, i] < 0)}
+        np.testing.assert_allclose(truth.d.sum(axis=1), 0.0, atol=1e-12)
     if not hit & set(case.deficient.inputs):
         for i, state in enumerate(case.deficient.states):
             assert bool(np.any(truth.d[:, i] != 0)) == (state in hit)

@@ -53,6 +53,7 @@ def row(trial: Trial) -> dict[str, Any]:
         "plausible": [written(_names(candidate.effects)) for candidate in verdict.plausible],
         "plausible_weights": [candidate.weight for candidate in verdict.plausible],
         "candidates": len(found.problem.terms),
+        "measurements": found.problem.count,
         "seconds": seconds,
         "cpu_seconds": busy,
     }

@@ -25,6 +25,8 @@ NEXT = 5  # second effects refitted for each of them
 CLOSE = 25.0  # rivals within this of the best are converged before weights are formed
 ALARM = 9.0  # Lambda above which the model fails
 LOUD = 25.0  # of the noise's variance: an error from which the model fails whatever a process noise is worth
+SWAPPED = 6  # candidates that are refitted in the place of each member of the best set
+ROUNDS = 5  # times that swapping goes on from the best set that it led to
 WORTH = 0.7  # of the error's variance: what a further effect must leave less than, for yet another to be sought
 PAIRS = 4  # pairs that are refitted because they help together, at each of two levels
 
@@ -163,6 +165,17 @@ def _grow(found: Search) -> Search:
         if frozenset(active) not in known and not apart:
             known[frozenset(active)] = refit(problem, parent, active, entries)
 
+    def bent(k: int) -> bool:
+        effect = problem.terms[k].effect
+        return effect.law == "restoring" and bool(effect.inner)
+
+    def without(grown: Hypothesis, k: int) -> tuple[Hypothesis, list[Score]]:
+        rest = tuple(other for other in grown.active if other != k)
+        if frozenset(rest) not in known:
+            known[frozenset(rest)] = homotopy(problem, grown.exact.point, rest, first=0.01, tolerance=0.1)
+        parent = known[frozenset(rest)]
+        return parent, score(problem, parent, skip=(*found.absorbed, k))
+
     for size in (2, 3):
         beam = sorted((h for h in known.values() if len(h.active) == size - 1), key=found.criterion)[:BEAM]
         best = min([found.base, *known.values()], key=found.criterion)
@@ -172,22 +185,26 @@ def _grow(found: Search) -> Search:
         for parent in beam:
             for entry in score(problem, parent, skip=found.absorbed)[:NEXT]:
                 extend(parent, [entry])
-        grown = min([found.base, *known.values()], key=found.criterion)
-        # Swap and drop: the best set with each of its members replaced or removed.
-        for k in grown.active if len(grown.active) == size else ():
-            rest = tuple(other for other in grown.active if other != k)
-            if frozenset(rest) not in known:
-                known[frozenset(rest)] = homotopy(problem, grown.exact.point, rest, first=0.01, tolerance=0.1)
-            for entry in score(problem, known[frozenset(rest)], skip=found.absorbed)[:3]:
-                extend(known[frozenset(rest)], [entry])
+            # A force that bends off at a width of its own imitates a polynomial of one term more.
+            for k in filter(bent, parent.active) if size == 3 else ():
+                rest, scores = without(parent, k)
+                for both in pairs(problem, rest, scores, 2):
+                    extend(rest, both)
+        # Swap and drop: the best set with each of its members replaced or removed, and again the one that this leads to.
+        for _ in range(ROUNDS):
+            grown = min([found.base, *known.values()], key=found.criterion)
+            for k in grown.active if len(grown.active) == size else ():
+                rest, scores = without(grown, k)
+                for entry in scores[:SWAPPED]:
+                    extend(rest, [entry])
+            if min([found.base, *known.values()], key=found.criterion) is grown:
+                break
         fitted = _converged(found, list(known.values()))
         known = {frozenset(hypothesis.active): hypothesis for hypothesis in fitted}
         grown = min(known.values(), key=found.criterion)
         if found.criterion(grown) >= found.criterion(best):
             break
-        # A force that bends off at a width of its own imitates a polynomial of one term more.
-        bent = any(problem.terms[k].effect.law == "restoring" and problem.terms[k].inner for k in grown.active)
-        if not (needs_more(found, grown) or bent):
+        if not (needs_more(found, grown) or any(map(bent, grown.active))):
             break
         if needs_more(found, grown) and left(grown) > WORTH * left(best):
             break

@@ -35,20 +35,21 @@ def candidates(
     """Every effect wherever its roles are played: in the suspect equations, and in measurements, inputs, parameters.
 
     The model's symmetries are kept: where no equation depends on a state's absolute value (height in free fall), no
-    candidate of a rate may either, unless `absolute`, or unless the `record` shows it going to and fro about its zero,
-    which then means something. Of two candidates of the same shape in one equation the first
+    candidate of a rate may either, unless `absolute`, or unless its zero means something: a store's, which others fill,
+    or that of a state which the `record` shows going to and fro about it. Of two candidates of the same shape in one equation the first
     stays, physics before a generic stand-in. The model's own effects come first; one that names its equation acts there
     whatever is suspect.
     """
     effects = {effect.id: effect for effect in model.effects} | dict(effects)
     used = set().union(*(rate.free_symbols for rate in model.rates))
     centred = roles.centred(model, record) if record is not None else set()
-    hidden = set() if absolute else {s for s in model.states if expressions.symbol(s) not in used} - centred
+    stores = {s for s in model.states if roles.sources(model, s)}
+    hidden = set() if absolute else {s for s in model.states if expressions.symbol(s) not in used} - centred - stores
     names = Names(model)
-    found: dict[tuple[str, sympy.Expr], Term] = {}
+    found: dict[tuple[str, str, sympy.Expr], Term] = {}
     for term in _where_it_says(model, names):
         shape = _shape(term, names)
-        found[(term.equation, shape if _positive(shape) else -shape)] = term
+        found[(term.equation, "", shape if _positive(shape) else -shape)] = term
     for equation in model.suspects:
         level = roles.level(model, equation)
         own = [term for effect in effects.values() for term in _in_rate(model, effect, equation, level, names)]
@@ -56,7 +57,7 @@ def candidates(
             shape = _shape(term, names)
             texts = [term.text, *(z[0] for z in term.states.values())]
             if not hidden & set().union(*map(_words, texts)):
-                found.setdefault((equation, shape if _positive(shape) else -shape), term)
+                found.setdefault((equation, term.source, shape if _positive(shape) else -shape), term)
     elsewhere = [term for effect in effects.values() for term in _elsewhere(model, effect, names)]
     return (*found.values(), *elsewhere)
 
@@ -136,6 +137,8 @@ def _in_rate(model: Model, effect: Effect, equation: str, level: str | None, nam
     others = [s for s in model.states if s not in own] if "other" in wanted else [""]
     if "other" in wanted and effect.id == "product_coupling":
         others = [s for s in model.states if s != equation]
+    if "source" in wanted:
+        others = [s for s in roles.sources(model, equation) if s in model.suspects]
     small = len(model.states) <= FEW_STATES
     both = [(other, next((s for s in model.states if s not in (equation, other)), "")) for other in others]
     if "another" in wanted and small:
@@ -149,6 +152,7 @@ def _in_rate(model: Model, effect: Effect, equation: str, level: str | None, nam
             "content": equation,
             "any": equation,
             "other": other,
+            "source": other,
             "another": another,
             "deviation": deviation,
             "temperature": f"({equation}{offset})",
@@ -160,7 +164,9 @@ def _in_rate(model: Model, effect: Effect, equation: str, level: str | None, nam
             third = [letter for letter, role in effect.roles.items() if role == "another" and letter in _words(form)]
             if third and not (small and another):
                 continue
-            yield _bound(effect, form, "rate", equation, "", letters, variable, names)
+            yield _bound(
+                effect, form, "rate", equation, "", letters, variable, names, other if "source" in wanted else ""
+            )
 
 
 def _elsewhere(model: Model, effect: Effect, names: Names) -> Iterator[Term]:
@@ -192,7 +198,7 @@ def _elsewhere(model: Model, effect: Effect, names: Names) -> Iterator[Term]:
 
 def _bound(
     effect: Effect, form: str, place: Place, equation: str, symbol: str, letters: Mapping[str, str], variable: str,
-    names: Names,
+    names: Names, source: str = "",
 ) -> Term:  # fmt: skip
     """A candidate: the effect's text with its letters replaced, its parameters and states under names of their own."""
     fresh = {name: names.fresh(name) for name in (*effect.coefficients, *effect.inner, *effect.states)}
@@ -210,6 +216,7 @@ def _bound(
         place,
         symbol,
         {fresh[name]: (written(z.rate), written(z.start), z.free) for name, z in effect.states.items()},
+        source,
     )
 
 

@@ -51,6 +51,27 @@ def level(model: Model, equation: str) -> str | None:
     return None
 
 
+def sources(model: Model, equation: str) -> list[str]:
+    """The other states among which the model moves what this one holds: a part of one rate stands in another with the
+    other sign, directly or from state to state. Positions and their rates hold nothing.
+    """
+    order = list(model.states)
+    moving = {*model.definitions, *(model.states[p].strip() for p in model.definitions)}
+    if equation in moving:
+        return []
+    parts = [
+        set() if name in moving else set(sympy.Add.make_args(sympy.expand(rate)))
+        for name, rate in zip(order, model.rates, strict=True)
+    ]
+    reached, waiting = {equation}, [equation]
+    while waiting:
+        own = {-part for part in parts[order.index(waiting.pop())]}
+        fresh = [name for name, others in zip(order, parts, strict=True) if name not in reached and own & others]
+        reached.update(fresh)
+        waiting += fresh
+    return [name for name in order if name in reached and name != equation]
+
+
 def is_angle(model: Model, state: str) -> bool:
     """Whether a position is an angle: by its unit, by its output, or by its name."""
     unit = model.units.get(state)

@@ -26,6 +26,7 @@ class Term:
     `text` is the term in the model's names; `coefficients`, `inner` and `states` (rate, first value, whether that is
     estimated) are new names; `variable` is what it is a function of, for a picture. `place` says what it is added to:
     the rate or output `equation`, or the input or parameter `symbol` wherever that stands, or (clock) to every rate.
+    `source` is a state whose rate loses the same, "" for none.
     """
 
     effect: Effect
@@ -37,6 +38,7 @@ class Term:
     place: Place = "rate"
     symbol: str = ""
     states: Mapping[str, tuple[str, str, bool]] = field(default_factory=dict)
+    source: str = ""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -83,7 +85,7 @@ class Term:
             case "clock":
                 return f"all rates times (1 {text[0]} {text[1:].removesuffix('*1')})"
             case _:
-                return text
+                return f"{text}, which {self.source} loses" if self.source else text
 
 
 def grown(model: Model, terms: Sequence[Term], numbers: Sequence[Mapping[str, Parameter]]) -> Model:
@@ -111,6 +113,7 @@ def grown(model: Model, terms: Sequence[Term], numbers: Sequence[Mapping[str, Pa
         initial = {names[z]: Initial(at[z].value, estimate=free) for z, (_, _, free) in term.states.items()}
         target = term.equation if term.place in ("rate", "output") else term.symbol
         model = model.plus(target, text, parameters, states, initial, measured=term.place == "output")
+        model = model.plus(term.source, _opposite(text)) if term.source else model
         known = {names[z]: said for z in term.states if (said := unit[z])}
         model = replace(model, units={**model.units, **known}) if known else model
     return model
@@ -134,6 +137,13 @@ def _free(model: Model, wanted: Sequence[str]) -> dict[str, str]:
 def _one(term: Term, text: str) -> str:
     """The text with a pinned coefficient left out."""
     return re.sub(rf"\b{term.coefficients[0]}\*", "", text) if term.effect.pinned else text
+
+
+def _opposite(text: str) -> str:
+    """The text, which opens with its sign, with the other sign."""
+    inner = text[1:].strip()
+    product = re.fullmatch(r"[\w.*]+", inner) is not None
+    return f"{'-' if text[0] == '+' else '+'}{inner if product else f'({inner})'}"
 
 
 def _renamed(text: str, names: Mapping[str, str]) -> str:
@@ -164,6 +174,7 @@ def gates(model: Model, terms: Sequence[Term]) -> tuple[tuple[str, ...], tuple[c
         match term.place:
             case "rate":
                 rates = {order.index(term.equation): added}
+                rates |= {order.index(term.source): -added} if term.source else {}
             case "output":
                 outputs = {list(model.outputs).index(term.equation): added}
             case "clock":

@@ -101,6 +101,7 @@ def where(effect: Effect) -> str:
         "state": "a state `{}` without position, in whose rate it acts",
         "content": "a state `{}` that is no temperature and has no position, in whose rate it acts",
         "any": "a state `{}`, in whose rate it acts", "other": "another state `{}`", "another": "a third state `{}`",
+        "source": "another state `{}`, whose rate loses the same, where the model already moves something between them",
         "deviation": "its deviation `{}` from the level that it relaxes to (itself where there is none)",
         "temperature": "its absolute temperature `{}`", "level": "the ambient's absolute temperature `{}`",
         "output": "an output `{}`", "input": "an input `{}`", "late": "the input one coefficient earlier, `{}`",

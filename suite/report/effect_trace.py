@@ -121,7 +121,7 @@ class Motion:
             self.held = np.interp(self.t, at, y)
         else:
             self.held = self.input
-        self.coupled = bool(roles & {"other", "another"})
+        self.coupled = bool(roles & {"other", "another", "source"})
 
     def of(self, role: str) -> Array:
         """What plays a role, (N,)."""
@@ -129,7 +129,7 @@ class Motion:
         match role:
             case "position" | "angle" | "output":
                 return self.position
-            case "other" | "clock":
+            case "other" | "source" | "clock":
                 return self.steady
             case "rate" | "another":
                 return self.rate
@@ -158,7 +158,7 @@ def _variable(effect: Effect, letters: Mapping[str, Array], motion: Motion) -> t
     placed = ("position", "angle")
     seen = [letter for letter in letters if np.ptp(letters[letter]) > 0
             and (_holds(texts, letter) or effect.roles[letter] in placed)]  # fmt: skip
-    order = ("other", "position", "angle", "rate", "temperature", "deviation")
+    order = ("other", "source", "position", "angle", "rate", "temperature", "deviation")
     for role in order:
         for letter in seen:
             if effect.roles[letter] == role:
