@@ -36,5 +36,5 @@ def readings(model: Model, record: Record) -> dict[str, Array]:
 
 def derivative_of(model: Model) -> dict[str, str]:
     """The state whose rate each state is, by state, where that is a definition: p' = v gives v: p."""
-    at = {expressions.symbol(name): name for name in model.states}
+    at: dict[sympy.Expr, str] = {expressions.symbol(name): name for name in model.states}
     return {at[rate]: name for name, rate in zip(model.states, model.rates, strict=True) if name in model.definitions}
