@@ -203,11 +203,11 @@ def _errors(
     nothing = np.zeros((n, n))
     run = filtered(model, record, X[0], nothing, nothing, R, around=(X, X))
     H = run.H
-    gains = np.where(np.isnan(record.y)[:, None, :], 0.0, 2.0 * S @ (H / R[:, None]).transpose(0, 2, 1))
+    gains: Array = np.where(np.isnan(record.y)[:, None, :], 0.0, 2.0 * S @ (H / R[:, None]).transpose(0, 2, 1))
     if predicted:
         # 2 [I + 2 S H' R^-1 H]^-1 S H' R^-1: what a sample of that weight does; the first one does nothing here.
         try:
-            gains = np.linalg.solve(np.eye(n) + gains @ H, gains)
+            gains = np.asarray(np.linalg.solve(np.eye(n) + gains @ H, gains), dtype=np.float64)
         except np.linalg.LinAlgError:  # an indefinite S can make it singular
             return None
         gains[0] = 0.0

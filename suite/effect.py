@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 Role = Literal[
-    "position", "angle", "rate", "state", "content", "any", "other", "another", "source", "deviation", "temperature", "level",
-    "output", "input", "late", "held", "parameter", "fixed", "clock",
+    "position", "angle", "rate", "state", "content", "any", "other", "another", "source", "deviation", "temperature",
+    "level", "output", "input", "late", "held", "parameter", "fixed", "clock",
 ]  # fmt: skip
 
 
@@ -57,10 +57,10 @@ class Effect:
 
     - in a rate: "position" and "rate" are a pair p' = v with the effect in v', "angle" a position that is an angle;
       "state" is the state in whose equation it acts, where that has no position; "content" is such a state that is no
-      temperature; "any" is either; "other" another state, "another" a third one (of small models only); "source" another
-      one, whose rate loses what this one's gains, where the model already moves something between them; "deviation" the
-      state minus the level that its equation relaxes to (itself where there is none); "temperature" an absolute
-      temperature, "level" its ambient;
+      temperature; "any" is either; "other" another state, "another" a third one (of small models only); "source" is
+      another one, whose rate loses what this one's gains, where the model already moves something between them;
+      "deviation" the state minus the level that its equation relaxes to (itself where there is none); "temperature" an
+      absolute temperature, "level" its ambient;
     - in a measurement: "output" is the output's own equation, to which the term is added;
     - in an input: "input" is the input, which becomes input + term wherever it acts; "late" is the input as it was one
       coefficient earlier, "held" as it is when held the other way between samples;

@@ -60,7 +60,8 @@ def run(args: argparse.Namespace) -> int:
         steps.append(f"once it is registered, judge it: unmodelled bench run --plan quick --only {name}")
     elif args.kind == "case":
         steps.append(
-            f'once it is registered, judge on it: cases = ["{name}"] in plan.toml, unmodelled bench run --plan plan.toml'
+            f'once it is registered, judge on it: cases = ["{name}"] in plan.toml, '
+            "unmodelled bench run --plan plan.toml"
         )
     if args.json:
         print(json.dumps({"files": [str(path) for path in written], "registered": registered, "next": steps}, indent=1))

@@ -57,7 +57,7 @@ PLANTS = (
 def _beside_a_record(number: int) -> tuple[Model, Record]:
     """A plant with a record of its own, of 1 % noise."""
     model = PLANTS[number]
-    t = STEP * np.arange(SAMPLES)
+    t = STEP * np.arange(float(SAMPLES))
     u = (2.0 + np.sin(1.7 * t) + 0.5 * np.cos(4.1 * t))[:, None]
     still = Record(t, u, np.zeros((SAMPLES, len(model.outputs))))
     y = simulate(model, still)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -74,7 +75,7 @@ def irregular_steps(estimator: Estimator) -> str:
 
 def short_records(estimator: Estimator) -> str:
     """Two and three samples."""
-    ends = [how(_two_states(estimator, lambda r, m, k=count: plants.short(r, m, k))) for count in (2, 3)]
+    ends = [how(_two_states(estimator, partial(plants.short, samples=count))) for count in (2, 3)]
     return next((end for end in ends if end), "")
 
 

@@ -35,7 +35,8 @@ class Path:
         """One realisation, (N, n)."""
         values, vectors = np.linalg.eigh(self.covariance)
         noise = rng.standard_normal(len(values)) * np.sqrt(np.maximum(values, 0.0))
-        return self.mean + np.asarray(vectors @ noise).reshape(self.mean.shape)
+        offset: Array = np.reshape(vectors @ noise, self.mean.shape)
+        return self.mean + offset
 
     def given(self, y: Array, R: Array, *, causal: bool) -> tuple[Array, Array]:
         """Mean (N, n) and covariance (N, n, n) given the measurements up to each sample, or (not causal) all."""

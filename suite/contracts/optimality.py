@@ -93,7 +93,7 @@ def calibrated(estimator: Estimator) -> str:
             raise NotApplicableError("it returns no covariance")
         error = found.x[k] - x[k, :n]
         total += float(error @ np.linalg.pinv(found.P[k], hermitian=True) @ error)
-    low, high = (float(v) / (SEEDS * n) for v in chi2.ppf([RARE, 1.0 - RARE], SEEDS * n))
+    low, high = (float(chi2.ppf(p, SEEDS * n)) / (SEEDS * n) for p in (RARE, 1.0 - RARE))
     ratio = total / (SEEDS * n)
     said = f"NEES {ratio:.2f} of 1 over {SEEDS} seeds, band {low:.2f} to {high:.2f}"
     if estimator.optimal is None:

@@ -53,7 +53,8 @@ def shaped(estimate: Estimate, N: int, n: int) -> None:
         value = getattr(estimate, name)
         if value is None and name != "x":
             continue
-        demand(isinstance(value, np.ndarray), f"{name} is {type(value).__name__}, not an array")
+        if not isinstance(value, np.ndarray):
+            raise BrokenContractError(f"{name} is {type(value).__name__}, not an array")
         demand(value.shape == shape, f"{name} has shape {value.shape}, expected {shape}")
         demand(bool(np.all(np.isfinite(value))), f"{name} holds {_first_bad(value)}; status was {estimate.status!r}")
     demand(

@@ -14,8 +14,9 @@ from suite.report.figures import plain
 POINTS = 330  # of a curve over time
 GRID = 160  # of a curve that follows its variable alone
 NAMES = {
-    "other": "another state", "source": "the other store", "position": "position", "angle": "angle", "rate": "rate", "temperature": "temperature",
-    "deviation": "deviation from its level", "state": "state", "content": "content", "any": "state",
+    "other": "another state", "source": "the other store", "position": "position", "angle": "angle", "rate": "rate",
+    "temperature": "temperature", "deviation": "deviation from its level", "state": "state", "content": "content",
+    "any": "state",
     "output": "true reading", "input": "input", "parameter": "parameter", "fixed": "parameter", "clock": "a state",
 }  # fmt: skip
 # What stands without the effect, and what with it.
