@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import sympy
 
-from suite import expressions
+from suite import along, expressions
 from suite.model import Model
 from suite.record import Record
 
@@ -27,9 +27,7 @@ def read_by(model: Model) -> dict[str, str]:
 def readings(model: Model, record: Record) -> dict[str, Array]:
     """The states that are read directly, each (N,), NaN where its sensor was not read."""
     outputs, states = list(model.outputs), list(model.states)
-    still = np.zeros(len(states))
-    h0 = np.array([model.output(t, still, u) for t, u in zip(record.t, record.u, strict=True)])
-    H = np.array([model.output_jacobian(t, still, u) for t, u in zip(record.t, record.u, strict=True)])
+    h0, H = along.outputs(model, record, np.zeros((len(record), len(states))))
     pairs = {state: (outputs.index(output), states.index(state)) for state, output in read_by(model).items()}
     return {state: (record.y[:, j] - h0[:, j]) / H[:, j, i] for state, (j, i) in pairs.items()}
 

@@ -5,16 +5,22 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from suite.benchmark import claims, hashes, metrics, plan, statistics, table
+from suite import along, plugins
+from suite.benchmark import claims, hashes, innovations, metrics, plan, statistics, table
 from suite.benchmark.cells import Cell
+from suite.case import Case, Missing
+from suite.contracts import plants
 from suite.errors import InputError
 from suite.estimator import Estimate
+from suite.model import Model, Output, Parameter
 from suite.prior import default_prior
+from suite.record import Record
 
 
 def test_table_1_is_reproduced_within_one_percent() -> None:
@@ -65,6 +71,62 @@ def test_nis_and_nees_are_one_for_an_exact_filter() -> None:
     row = metrics.judge(case, record.with_prior(prior), replace(truth, x=x), estimate, "filter")
     assert row["nis"] == pytest.approx(1.0, abs=0.15)
     assert row["nees"] == pytest.approx(1.0, abs=0.25)
+
+
+def test_the_judge_at_once_is_the_judge_sample_by_sample() -> None:
+    """Residuals, innovations, NIS, NEES and coefficients of whole arrays are those of the textbook formulas, taken
+    one sample after another, on a record whose channels have gaps of their own.
+    """
+    case = Case(
+        "hardening", "", plants.LINEAR, plants.HARDENING, missing=(Missing("cubic_stiffness", "v", {"a": 1.0}),)
+    )
+    model = case.deficient
+    record = plants.by_channel(plants.record(model, plants.HARDENING), model)
+    estimate = plugins.estimators()["random-walk-filter"].estimate(model, record)
+    P, d = estimate.P, estimate.d
+    assert P is not None
+    assert d is not None
+    assert record.prior is not None
+    # A direction that is known exactly, and one sample whose filter follows its sensor to the last digit.
+    P = P.copy()
+    P[5] = np.diag([0.0, 0.3])
+    P[8] = np.diag(record.prior.R)
+    estimate = replace(estimate, P=P)
+    r = np.array([record.y[k] - model.output(record.t[k], estimate.x[k], record.u[k]) for k in range(len(record))])
+    R, e = record.prior.R, np.full(r.shape, np.nan)
+    for k in range(1, len(record)):
+        seen = ~np.isnan(record.y[k])
+        H = model.output_jacobian(record.t[k], estimate.x[k], record.u[k])[seen]
+        gap = np.diag(R[seen]) - H @ P[k] @ H.T
+        if seen.any() and np.linalg.eigvalsh(gap / R[seen].max())[0] > 1e-9:
+            e[k, seen] = np.linalg.solve(np.linalg.cholesky(gap), r[k, seen])
+    whole = innovations.whitened(model, record, estimate)
+    assert whole is not None
+    assert np.isnan(e).any(axis=1).sum() > len(record) / 2
+    assert not np.isfinite(e[8]).any()
+    np.testing.assert_allclose(whole, e, rtol=1e-10)
+    rows = np.isfinite(e).any(axis=1)
+    assert metrics.nis(model, record, estimate) == pytest.approx(np.nanmean(e[rows] ** 2, axis=1).mean(), rel=1e-10)
+    error = estimate.x - np.roll(estimate.x, 1, axis=0)
+    squares = [error[k] @ np.linalg.pinv(P[k], hermitian=True) @ error[k] for k in range(len(record))]
+    assert metrics.nees(error, P) == pytest.approx(np.mean(squares) / 2, rel=1e-10)
+    row = metrics.judge(case, record, None, estimate, "filter")
+    rms = np.sqrt(np.nanmean(r**2, axis=0))
+    assert list(row["output_rmse"].values()) == pytest.approx(rms.tolist(), rel=1e-10)
+    cubes = -(estimate.x[:, 0] ** 3)
+    found = metrics.coefficients(case, record, estimate)["parameters"]["a"]
+    assert found == pytest.approx(cubes @ d[:, 1] / (cubes @ cubes), rel=1e-10)
+
+
+def test_an_angle_just_short_of_a_turn_is_a_small_error() -> None:
+    """The residual of an output that is an angle is counted around the circle."""
+    model = Model("turn", {"a": "w"}, parameters={"w": Parameter(0.0)}, outputs={"a": Output("a", "a", angle=True)})
+    record = Record(np.arange(3.0), np.zeros((3, 0)), np.array([[3.1], [-3.1], [np.nan]]))
+    missed, _ = along.residuals(model, record, np.full((3, 1), 3.12))
+    np.testing.assert_allclose(missed[:2, 0], [-0.02, 2 * np.pi - 6.22], rtol=1e-9)
+    assert np.isnan(missed[2, 0])
+    with pytest.raises(ValueError, match=r"expected states of the shape \(3, 1\), got \(2, 1\)"):
+        along.outputs(model, record, np.zeros((2, 1)))
 
 
 def test_failures_rank_last_and_are_counted() -> None:

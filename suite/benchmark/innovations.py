@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from suite import along
 from suite.estimator import Estimate
 from suite.model import Model
 from suite.record import Record
@@ -23,16 +24,19 @@ def whitened(model: Model, record: Record, estimate: Estimate) -> Array | None:
     if record.prior is None or estimate.P is None:
         return None
     R = record.prior.R
-    e = np.full(record.y.shape, np.nan)
+    seen = ~np.isnan(record.y)
     # The first sample may have given the first state, so it is no innovation.
-    for k in range(1, len(record)):
-        seen = ~np.isnan(record.y[k])
-        if not seen.any():
-            continue
-        r = (record.y[k] - model.output(record.t[k], estimate.x[k], record.u[k]))[seen]
-        H = model.output_jacobian(record.t[k], estimate.x[k], record.u[k])[seen]
-        gap = np.diag(R[seen]) - H @ estimate.P[k] @ H.T
-        if np.linalg.eigvalsh(gap / np.max(R[seen]))[0] < 1e-9:
-            continue
-        e[k, seen] = np.linalg.solve(np.linalg.cholesky(gap), r)
+    seen[0] = False
+    gap, H = along.residuals(model, record, estimate.x)
+    r = np.where(seen, gap, 0.0)
+    H = np.where(seen[:, :, None], H, 0.0)
+    # Channels that are not seen are kept apart with a residual of zero and a variance that never is the smallest.
+    largest = np.where(seen.any(axis=1), np.max(np.where(seen, R, 0.0), axis=1), 1.0)
+    spread = -H @ estimate.P @ H.transpose(0, 2, 1)
+    np.einsum("kii->ki", spread)[...] += np.where(seen, R, largest[:, None])
+    sound = np.flatnonzero(seen.any(axis=1) & np.isfinite(spread).all(axis=(1, 2)))
+    sound = sound[np.linalg.eigvalsh(spread[sound] / largest[sound, None, None])[:, 0] >= 1e-9]
+    e = np.full(record.y.shape, np.nan)
+    e[sound] = np.linalg.solve(np.linalg.cholesky(spread[sound]), r[sound, :, None])[:, :, 0]
+    e[~seen] = np.nan
     return e if np.isfinite(e).any(axis=1).sum() > len(record) // 2 else None

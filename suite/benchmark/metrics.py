@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from suite import plugins
+from suite import along, plugins
 from suite.benchmark.innovations import whitened
 from suite.case import Case, Truth
 from suite.estimator import Estimate
@@ -25,6 +25,9 @@ SHAPES: dict[str, Callable[[Array], Array]] = {
     "{}^3": lambda s: s**3,
     "sign({})": np.sign,
 }
+
+# An eigenvalue of a covariance below this share of the largest one is rounding.
+EXACT = 1e-15
 
 
 def judge(
@@ -97,15 +100,13 @@ def coefficients(case: Case, record: Record, estimate: Estimate) -> dict[str, An
     if not _in_rates(case) or case.truth is None or estimate.d is None:
         return {}
     columns = list(case.truth.parameters)
-    values = case.truth.values
     found: dict[str, float] = {}
     errors: dict[str, float] = {}
     for equation in dict.fromkeys(missing.equation for missing in case.missing):
         i = list(case.deficient.states).index(equation)
         truths = {n: v for m in case.missing if m.equation == equation for n, v in m.coefficients.items()}
         wanted = [columns.index(name) for name in truths]
-        x, u, t, program = estimate.x, record.u, record.t, case.truth.program
-        terms = np.array([program.rates(t[k], x[k], u[k], values)[2][i, wanted] for k in range(len(t))])
+        terms = along.rate_slopes(case.truth, record, estimate.x, i, wanted)
         fitted = np.linalg.lstsq(terms, estimate.d[:, i], rcond=None)[0]
         found |= dict(zip(truths, fitted.tolist(), strict=True))
         errors |= {name: abs(found[name] - true) / abs(true) for name, true in truths.items()}
@@ -148,7 +149,11 @@ def nees(error: Array, P: Array) -> float:
 
     Directions in which P says "known exactly" are left out of the inverse.
     """
-    total = [e @ np.linalg.pinv(S, hermitian=True) @ e for e, S in zip(error, P, strict=True)]
+    size, axes = np.linalg.eigh(P)
+    along_axes = np.einsum("kji,kj->ki", axes, error)
+    # The pseudo-inverse: what is rounding beside the largest eigenvalue counts as zero.
+    unsure = np.abs(size) > EXACT * np.abs(size).max(axis=1, keepdims=True)
+    total = np.sum(np.where(unsure, along_axes**2 / np.where(unsure, size, 1.0), 0.0), axis=1)
     return float(np.mean(total) / error.shape[1])
 
 
@@ -167,6 +172,5 @@ def nis(model: Model, record: Record, estimate: Estimate) -> float | None:
 
 def _output_rmse(model: Model, record: Record, estimate: Estimate) -> dict[str, float]:
     """Root mean square of z - h(xhat) by output: how closely the estimate follows the measurements, not a score."""
-    h = np.array([model.output(record.t[k], estimate.x[k], record.u[k]) for k in range(len(record))])
-    rms = np.sqrt(np.nanmean((record.y - h) ** 2, axis=0))
+    rms = np.sqrt(np.nanmean(along.residuals(model, record, estimate.x)[0] ** 2, axis=0))
     return dict(zip(model.outputs, rms.tolist(), strict=True))

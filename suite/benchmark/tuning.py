@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import qmc
 
-from suite import plugins
+from suite import along, plugins
 from suite.benchmark.cells import experiment
 from suite.benchmark.store import Store
 from suite.case import Case
@@ -131,6 +131,6 @@ def _score(
         if not np.all(np.isfinite(estimate.x)) or estimate.status != "ok":
             return math.inf
         at = np.flatnonzero(gone)
-        h = np.array([case.deficient.output(whole.t[k], estimate.x[k], whole.u[k]) for k in at])
-        total += float(np.nanmean((whole.y[at] - h) ** 2 / np.nanvar(whole.y, axis=0)))
+        missed = along.residuals(case.deficient, whole, estimate.x)[0][at]
+        total += float(np.nanmean(missed**2 / np.nanvar(whole.y, axis=0)))
     return total / len(records)
