@@ -1,12 +1,60 @@
-"""Where the measured records are: beside the checkout if they are there; tests that need them skip elsewhere."""
+"""What tests of several files share: where the measured records are, if they are, and plants for the estimators."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from suite.model import Initial, Input, Model, Output, Parameter
+from suite.record import Prior, Record
 
 BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
 
-# At import, so that child processes and the collection of tests see it too.
+# At import, so that child processes and the collection of tests see it too; tests that need the records skip elsewhere.
 if BESIDE.is_dir():
     os.environ.setdefault("UNMODELLED_DATA", str(BESIDE))
+
+OSCILLATOR = Model(
+    name="oscillator",
+    states={"p": "v", "v": "-c*v - 2*p"},
+    parameters={"c": Parameter(0.3)},
+    outputs={"p": Output("p", "p"), "s": Output("v + 0.5*p", "s")},
+    initial={"p": Initial(1.0), "v": Initial(0.0)},
+)
+PENDULUM = Model(
+    name="driven pendulum",
+    states={"angle": "rate", "rate": "F - c*rate - k*sin(angle)"},
+    parameters={"c": Parameter(0.3), "k": Parameter(2.0)},
+    inputs={"F": Input("F", "linear")},
+    outputs={"a": Output("angle", "a", angle=True), "r": Output("rate", "r")},
+    initial={"angle": Initial(0.0), "rate": Initial(0.0)},
+)
+PRIOR = Prior(np.array([0.9, 0.1]), np.diag([0.3, 0.1]), np.array([0.02, 0.01]), np.array([0.0, 0.4]))
+
+
+def record_of(model: Model, samples: int = 41, dt: float = 0.05, gaps: bool = True) -> Record:
+    """Uneven steps, the model driven by what it lacks (a slow force), noise, and a fifth of the readings missing."""
+    rng = np.random.default_rng(4)
+    t = np.cumsum(dt * rng.uniform(0.5, 1.5, samples))
+    force = "F" in model.inputs
+    truth = model.plus(list(model.states)[-1], "0.5*sin(0.7*t)")
+    u = np.sin(1.5 * t)[:, None] if force else np.zeros((samples, 0))
+    x, rows = np.array([0.9, 0.1]), []
+    for k in range(samples):
+        x = x if k == 0 else truth.step(t[k - 1], x, u[k - 1], t[k] - t[k - 1], u[k])
+        rows.append(truth.output(t[k], x, u[k]) + 0.1 * rng.standard_normal(2))
+    y = np.array(rows)
+    if gaps:
+        y[rng.random(y.shape) < 0.2] = np.nan
+        y[20:22] = np.nan
+    return Record(t, u, y, prior=PRIOR)
+
+
+@pytest.fixture(scope="session")
+def plants() -> SimpleNamespace:
+    """An oscillator and a driven pendulum, a prior for both, and `record` of either."""
+    return SimpleNamespace(OSCILLATOR=OSCILLATOR, PENDULUM=PENDULUM, PRIOR=PRIOR, record=record_of)

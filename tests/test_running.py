@@ -1,11 +1,10 @@
-"""A run of the benchmark can be killed, doubled, starved, moved to a cluster, merged: no cell is lost or repeated."""
+"""A run of the benchmark can be killed, doubled, starved, moved to a cluster: no cell is lost or repeated."""
 
 from __future__ import annotations
 
 import json
 import os
 import signal
-import sqlite3
 import subprocess
 import sys
 import time
@@ -15,13 +14,8 @@ from pathlib import Path
 
 import pytest
 
-from suite import plugins
-from suite.benchmark import grids, pool
-from suite.benchmark.cells import Cell
-from suite.benchmark.collect import collect
-from suite.benchmark.plan import parse
-from suite.benchmark.reservations import Reservations
-from suite.benchmark.store import SCHEMA, Store
+from suite.benchmark import pool
+from suite.benchmark.store import Store
 from suite.benchmark.worker import Failure, Task
 from suite.errors import InputError
 
@@ -225,120 +219,6 @@ def test_a_worker_killed_at_rest_or_at_work_costs_one_task_at_most() -> None:
             pids.append(outcome)
     assert pids[0] == pids[1]
     assert len(set(pids)) == 3
-
-
-def test_a_grid_is_a_variant_a_point() -> None:
-    """The product of all values, each read back from its label; other entries keep their variants."""
-    table = {
-        "cases": ["paper-cubic"], "noises": [0.05], "seeds": 1, "variants": ["default"],
-        "estimators": ["generalized-ie[alpha=0.1,1e3,riccati=transition,integration]", "ekf"],
-    }  # fmt: skip
-    cells = parse(table, "grid", "grid.toml").cells()
-    labels = [cell.variant for cell in cells if cell.estimator == "generalized-ie"]
-    assert [cell.variant for cell in cells if cell.estimator == "ekf"] == ["default"]
-    assert [grids.values(label) for label in labels] == [
-        {"alpha": alpha, "riccati": riccati} for alpha in (0.1, 1000) for riccati in ("transition", "integration")
-    ]
-
-
-def test_a_pattern_with_a_grid_means_those_that_take_it() -> None:
-    """`*[alpha=1]` is every estimator with an alpha, and none else."""
-    picked = grids.chosen(["*[alpha=1]"], plugins.estimators())
-    takers = {name for name, method in plugins.estimators().items() if "alpha" in (grids.keywords(method) or ())}
-    assert set(picked) == takers > {"generalized-ie"}
-
-
-@pytest.mark.parametrize(
-    ("entry", "said"),
-    [
-        ("ekf[q=1]", "ekf has no keyword argument 'q'; it has q_scale"),
-        ("ekf[q_scale=large]", "q_scale of ekf is a number, not 'large'"),
-        ("generalized-ie[riccati=fast]", "riccati of generalized-ie is one of transition, integration, not fast"),
-        ("ekf[q_scale=1", "is not a grid"),
-        ("ekf[q_scale=1,q_scale=2]", "is given twice"),
-        ("nothing[q_scale=1]", "no estimator is named like 'nothing'"),
-    ],
-)
-def test_a_grid_that_no_estimator_takes_is_refused(entry: str, said: str) -> None:
-    """One sentence says which keyword or value is wrong."""
-    with pytest.raises(InputError, match="(?s)" + said.replace("[", r"\[").replace("'", ".")):
-        parse({"estimators": [entry]}, "grid", "grid.toml").cells()
-
-
-def _filled(path: Path, rows: dict[int, str], tunings: dict[str, float] | None = None) -> Path:
-    with Store(path) as store:
-        for seed, reason in rows.items():
-            store.put(Cell("c", 0.0, "e", "default", seed), "key", {"status": "ok", "reason": reason})
-        for key, value in (tunings or {}).items():
-            store.put_tuning(key, {"values": {"alpha": value}})
-    return path
-
-
-def _reasons(store: Store) -> dict[int, str]:
-    return {row["seed"]: row["reason"] for row in store.rows()}
-
-
-def test_merged_stores_hold_the_newest_of_each(tmp_path: Path) -> None:
-    """Whatever the order of the files, the newest row of each cell and the tunings of all are there."""
-    old = _filled(tmp_path / "old", {0: "old", 1: "old"}, {"a": 1.0})
-    mine = _filled(tmp_path / "mine", {1: "mine", 2: "mine"})
-    new = _filled(tmp_path / "new", {2: "new", 3: "new"}, {"a": 2.0, "b": 3.0})
-    with Store(mine) as store:
-        assert collect(store, [new, old]) == {"cells": 3, "tunings": 2}
-        assert _reasons(store) == {0: "old", 1: "mine", 2: "new", 3: "new"}
-        assert store.tuning("a") == {"values": {"alpha": 2.0}}
-        assert collect(store, [old, new, mine]) == {"cells": 0, "tunings": 0}
-
-
-@pytest.mark.parametrize("spoil", ["text", "truncated", "schema", "other", "missing"])
-def test_a_bad_store_is_refused_and_nothing_is_lost(tmp_path: Path, spoil: str) -> None:
-    """After a good file a bad one: one sentence that names it, and the store is as it was."""
-    good, mine = _filled(tmp_path / "good", {5: "good"}), _filled(tmp_path / "mine", {0: "mine"})
-    bad = _filled(tmp_path / "bad", dict.fromkeys(range(500), "x" * 200))
-    if spoil == "text":
-        bad.write_text("not a database at all\n" * 100)
-    elif spoil == "truncated":
-        bad.write_bytes(bad.read_bytes()[:40960])
-    elif spoil == "missing":
-        bad.unlink()
-    else:
-        with sqlite3.connect(bad) as connection:
-            connection.execute(f"PRAGMA user_version={SCHEMA + 1}" if spoil == "schema" else "DROP TABLE tunings")
-        connection.close()
-    with Store(mine) as store:
-        with pytest.raises(InputError, match=str(bad)) as refused:
-            collect(store, [good, bad])
-        assert "\n" not in str(refused.value)
-        assert _reasons(store) == {0: "mine"}
-    if spoil != "missing" and spoil != "truncated":
-        with pytest.raises(InputError, match=str(bad)):
-            Store(bad)
-
-
-def test_a_store_without_a_schema_is_taken_over(tmp_path: Path) -> None:
-    """A file of the first layout, which had no number, keeps its rows and gets one."""
-    path = _filled(tmp_path / "first", {0: "kept"})
-    with sqlite3.connect(path) as connection:
-        connection.executescript("DROP TABLE runs; DROP TABLE taken; PRAGMA user_version=0;")
-    connection.close()
-    with Store(path) as store:
-        assert store.execute("PRAGMA user_version").fetchone() == (SCHEMA,)
-        assert _reasons(store) == {0: "kept"}
-        with Reservations(store) as held:
-            assert held.take("a")
-
-
-def test_a_silent_run_holds_nothing(tmp_path: Path) -> None:
-    """What a run that lives has taken no other gets; what a dead one had is free."""
-    path = tmp_path / "store"
-    with Store(path) as store, Store(path) as other, Reservations(store) as mine, Reservations(other) as theirs:
-        assert mine.take("a")
-        assert not theirs.take("a")
-        assert theirs.take("b")
-        mine.give_back("a")
-        assert theirs.take("a")
-        store.execute("UPDATE runs SET beat = 0 WHERE run = ?", (theirs.run,))
-        assert mine.take("a")
 
 
 def test_a_cluster_that_loses_a_worker_loses_no_cell(bench: Bench) -> None:
