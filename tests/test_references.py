@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +11,9 @@ import numpy as np
 import pytest
 
 from suite import plugins
-from suite.benchmark import cells, claims_twin, plan, references, statistics, twin
+from suite.benchmark import cells, claims_twin, matrix, plan, references, statistics, twin
+from suite.benchmark.store import Store
+from suite.benchmark.worker import Failure, Task
 from suite.case import Case, Experiment
 from suite.errors import DataError
 from suite.model import Initial, Model, Output, Parameter
@@ -114,6 +117,23 @@ def test_the_oracle_knows_the_state_that_the_model_lacks() -> None:
     assert "parameter_worst" not in found
 
 
+class Late(matrix.Running):
+    """Every cell takes too long."""
+
+    def results(self, tasks: Iterator[Task | None], limit: float) -> Iterator[tuple[Task, Failure]]:
+        yield from ((task, Failure("time-out", f"not done after {limit:g} s")) for task in tasks if task is not None)
+
+
+def test_a_reference_that_is_ended_stays_a_reference(tmp_path: Path) -> None:
+    """The row of a reference whose time is up has kind "reference" and says why it has no numbers."""
+    with Store(tmp_path / "store.sqlite") as store:
+        cell = cells.Cell("paper-cubic", 0.05, "posterior-crb-smoother", references.VARIANT, 0)
+        done = matrix.run([cell], store, Late(quiet=True))
+        row = store.rows()[0]
+    assert done["status"] == {"time-out": 1}
+    assert (row["kind"], row["status"]) == ("reference", "time-out")
+
+
 def test_references_stand_in_the_matrix_and_apart() -> None:
     """A plan lists them once a seed as variant "reference", untuned, not for measured cases; they are no estimators."""
     chosen = plan.parse({"cases": ["paper-cubic", "cooling-mug"], "seeds": 2, "noises": [0.05]}, "p", "p")
@@ -123,6 +143,10 @@ def test_references_stand_in_the_matrix_and_apart() -> None:
     assert not set(references.REFERENCES) & set(plugins.estimators())
     made = cells.run(mine[0], {}, None)
     assert (made["kind"], made["status"]) == ("reference", "ok")
+    for cell in mine:
+        # A cell that never answered has no numbers, and is still no method in the race.
+        assert statistics.is_reference({**cells.as_dict(cell), "status": "time-out"})
+    assert not statistics.is_reference({"estimator": "ekf", "variant": "default", "status": "time-out"})
     assert statistics.is_reference({**cells.as_dict(mine[0]), **made})
     only = plan.parse({"cases": ["paper-cubic"], "estimators": ["oracle"], "variants": ["tuned"], "seeds": 1}, "p", "p")
     assert {cell.estimator for cell in only.cells()} == {"oracle"}

@@ -25,6 +25,7 @@ from suite.benchmark.hashes import Keys
 from suite.benchmark.plan import Plan
 from suite.benchmark.progress import Progress
 from suite.benchmark.recovery import recovers
+from suite.benchmark.references import VARIANT
 from suite.benchmark.reservations import Reservations, offered
 from suite.benchmark.store import Store
 from suite.benchmark.worker import MEMORY, Failure, Task
@@ -116,7 +117,8 @@ def run(cells: Sequence[Cell], store: Store, how: Running, *, tune_only: bool = 
                 cell, row = done.label, outcome
                 if isinstance(outcome, Failure):
                     row = {"status": outcome.status, "reason": outcome.reason}
-                    row |= {"kind": "recovery"} if recovers(cell) else {}
+                    kind = "recovery" if recovers(cell) else cell.variant
+                    row |= {"kind": kind} if kind in ("recovery", VARIANT) else {}
                 hashes = {"plugin_hash": keys.plugin(cell.estimator), "case_hash": keys.case(cell.case)}
                 with store.transaction():
                     store.put(cell, keys.cell(cell), {**row, **hashes, "versions": versions})
