@@ -201,6 +201,16 @@ def test_an_empty_store_is_one_sentence(tmp_path: Path) -> None:
         bench_page.write([], [], tmp_path, "none.sqlite")
 
 
+def test_the_tuner_spends_nothing_on_what_does_not_apply(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A method that refuses the case is not called once; the reason is kept in place of points."""
+    method = plugins.estimators()["ekf"]
+    monkeypatch.setattr(type(method), "skip", lambda *_: "needs a second sensor")
+    monkeypatch.setattr(type(method), "estimate", lambda *_, **__: pytest.fail("the method was called"))
+    found = tuning.tune("paper-cubic", 0.05, "ekf", None)
+    assert (found["values"], found["skipped"], found["points"]) == ({}, "needs a second sensor", [])
+    assert bench_sensitivity.points([found]) == []
+
+
 def test_the_tuner_keeps_every_point() -> None:
     """As many points as evaluations, the default first, the best among them, and the envelope touches the best."""
     found = tuning.tune("paper-cubic", 0.05, "conventional-ie-discrete", None)

@@ -39,10 +39,16 @@ GAP = 4
 
 def tune(case_name: str, noise: float, name: str, data: Path | None) -> dict[str, Any]:
     """The best values found: {"values": by name, "score", "default_score", "evaluations", "points": each evaluated
-    value by name with its score, null where the method failed there; "case", "noise", "estimator"}.
+    value by name with its score, null where the method failed there; "case", "noise", "estimator"}. Where the method
+    does not apply, {"values": none, "skipped": the reason, "evaluations": 0, ...}.
     """
     case, estimator = plugins.cases()[case_name], plugins.estimators()[name]
     records = [_with_gaps(case, experiment(case, noise, seed, data)[0], seed % GAP) for seed in SEEDS]
+    told = {"case": case_name, "noise": noise, "estimator": name}
+    for part, _, _ in records:
+        reason = estimator.skip(case.deficient, part)
+        if reason is not None:
+            return {"values": {}, "skipped": reason, "evaluations": 0, "points": [], **told}
     ranges = list(estimator.tuning.values())
     names = list(estimator.tuning)
     points: list[dict[str, Any]] = []
@@ -80,9 +86,7 @@ def tune(case_name: str, noise: float, name: str, data: Path | None) -> dict[str
         "default_score": default_score if math.isfinite(default_score) else None,
         "evaluations": len(points),
         "points": points,
-        "case": case_name,
-        "noise": noise,
-        "estimator": name,
+        **told,
     }
 
 
