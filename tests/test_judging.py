@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import subprocess
 import sys
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 
 from suite import along, plugins
-from suite.benchmark import claims, hashes, innovations, metrics, plan, statistics, table
+from suite.benchmark import claims, hashes, innovations, metrics, plan, sources, statistics, table
 from suite.benchmark.cells import Cell
 from suite.case import Case, Missing
 from suite.contracts import plants
@@ -192,6 +193,54 @@ def test_keys_follow_what_they_depend_on() -> None:
     cell = Cell("paper-cubic", 0.05, "generalized-ie", "tuned", 0)
     assert keys.cell(cell) == hashes.Keys(None).cell(cell)
     assert keys.cell(cell) != keys.cell(Cell("paper-cubic", 0.05, "generalized-ie", "tuned", 1))
+
+
+def test_a_key_follows_the_modules_that_a_plug_in_builds_on(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A number that another distribution's plug-in imports from a module of its own package changes its hash, wherever
+    the import stands; a comment or a docstring does not, nor does a module that it does not import.
+    """
+    package = tmp_path / "foreign_filters"
+    package.mkdir()
+    files = {
+        "__init__.py": "",
+        "gain.py": '"""A filter."""\nfrom .numbers_of_it import GAIN\n\n\nclass Gain:\n    """One."""\n\n'
+        "    def estimate(self):\n        from foreign_filters import late\n        return GAIN * late.HALF\n",
+        "numbers_of_it.py": "GAIN = 2.0\n",
+        "late.py": "from suite.disturbance import SHARE\nHALF = 0.5 * SHARE\n",
+        "apart.py": "OTHER = 1\n",
+    }
+
+    def digest(**changed: str) -> str:
+        for name, text in {**files, **{f"{name}.py": text for name, text in changed.items()}}.items():
+            (package / name).write_text(text, encoding="utf-8")
+        for kept in (sources.text, sources.imported):
+            kept.cache_clear()
+        return hashes.plugin(module.Gain())
+
+    for name, text in files.items():
+        (package / name).write_text(text, encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    module = importlib.import_module("foreign_filters.gain")
+    before = digest()
+    assert digest(numbers_of_it="GAIN = 3.0\n") != before
+    assert digest(late="HALF = 0.5\n") != before
+    assert (
+        digest(numbers_of_it="# two\nGAIN = 2.0\n", gain=files["gain.py"].replace("One.", "A constant gain.")) == before
+    )
+    assert digest(apart="OTHER = 2\n") == before
+    assert {name for name, _ in sources.closure("foreign_filters.gain")} >= {"suite.disturbance", "suite.model"}
+    sources.text.cache_clear()
+    sources.imported.cache_clear()
+
+
+def test_no_module_that_an_estimator_loads_is_missing_from_its_key() -> None:
+    """What the import statements say is at least what a fresh process loads for a filter with a disturbance."""
+    script = "import sys, baselines.ekf\nprint(*[name for name in sys.modules if name.split('.')[0] in %r])"
+    run = [sys.executable, "-c", script % (sources.OURS,)]
+    loaded = set(subprocess.run(run, capture_output=True, text=True, check=True).stdout.split())
+    found = {name for name, _ in sources.closure("baselines.ekf")}
+    assert "suite.disturbance" in found
+    assert loaded - found <= {"baselines", "estimators"}
 
 
 def test_help_imports_nothing_heavy() -> None:

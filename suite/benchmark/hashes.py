@@ -1,31 +1,24 @@
-"""What a stored row depends on: the plug-in's source, the case as numbers, the version. Changed: run it again."""
+"""What a stored row depends on: the plug-in's sources, the case as numbers, the version. Changed: run it again."""
 
 from __future__ import annotations
 
 import hashlib
-import inspect
 import json
-import sys
 from functools import cache
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 import suite
 from suite import plugins
-from suite.benchmark import references
+from suite.benchmark import references, sources
 from suite.benchmark.cells import Cell
 from suite.benchmark.recovery import OURS, RIVALS
 from suite.case import Case
 from suite.errors import DataError
-
-# Plug-ins share code through these packages; what they take from elsewhere is pinned by the version.
-SHARED = ("estimators", "baselines", "suite.kernels", "suite.filtering", "suite.smoothing")
-
 
 METHODS = (OURS, *RIVALS)
 
@@ -35,35 +28,14 @@ def _digest(*parts: Any) -> str:
 
 
 def plugin(estimator: object) -> str:
-    """A hash of the source of an estimator's module and of what it takes from plug-in folders and kernels."""
-    todo, seen = [type(estimator).__module__], set()
-    texts = []
-    while todo:
-        name = todo.pop()
-        module = sys.modules.get(name)
-        if name in seen or module is None:
-            continue
-        seen.add(name)
-        texts.append(_source(name))
-        for value in list(vars(module).values()):
-            used = value.__name__ if isinstance(value, ModuleType) else getattr(value, "__module__", None)
-            if isinstance(used, str) and used.startswith(SHARED):
-                todo.append(used)
-    return _digest(*sorted(texts))
-
-
-def _source(name: str) -> tuple[str, str]:
-    """A module's name and its source, where there is any."""
-    try:
-        return name, inspect.getsource(sys.modules[name])
-    except (KeyError, OSError, TypeError):
-        return name, "no source"
+    """A hash of the source of an estimator's module and of what that builds on (see `sources`)."""
+    return _digest(*sources.closure(type(estimator).__module__))
 
 
 def measures() -> str:
     """A hash of the modules of the metrics that are plug-ins: a new one is a number that stored rows lack."""
     names = {getattr(metric.value, "__module__", "") for metric in plugins.metrics().values()}
-    return _digest(*sorted(_source(name) for name in names))
+    return _digest(*sorted((name, sources.text(name)) for name in names))
 
 
 # What a row of the recovery benchmark depends on, as files and folders of the packages.
