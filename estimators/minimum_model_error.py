@@ -26,8 +26,9 @@ class MinimumModelError(Estimator):
 
     d = (1/(2 alpha)) Q^-1 lambda minimises J, found by Gauss-Newton: smooth, linearise around the smoothed path,
     until it stands. At a sample d is the mean of lambda's values ahead of and behind the measurement (it ends at
-    zero: lambda(tf) = 0). P_d is the covariance of d's mean over the step that ends at the sample, d taken as white
-    noise of density (alpha Q)^-1. `Q` (weight of J, (n,) or (n, n)) overrides the prior's, density 1/(q_scale Q).
+    zero: lambda(tf) = 0). P_d is the covariance of d's mean over the step that ends at the sample (at the first, over
+    the first step), d taken as white noise of density (alpha Q)^-1. `Q` (weight of J, (n,) or (n, n)) overrides the
+    prior's, density 1/(q_scale Q).
     """
 
     name = "minimum-model-error"
@@ -49,7 +50,7 @@ class MinimumModelError(Estimator):
             when = f"the filter diverged at t = {record.t[run.failed_at]:.4g} s; its last estimate is held from there"
             x = held(run.x, run.failed_at)
             return Estimate(x=x, d=np.zeros_like(x), status="diverged", note=when)
-        result = smoothed(run)
+        result, Phi = smoothed(run), run.Phi
         path, kick = result.x, result.after @ noise
         for rounds in range(1, ROUNDS + 1):
             share = 1.0 if rounds <= FULL else 0.5
@@ -62,14 +63,17 @@ class MinimumModelError(Estimator):
                 status, note = "diverged", f"Gauss-Newton left every bound in round {rounds}; the round before is given"
                 break
             change = float(np.max(np.abs(trial.x - path) / (np.max(np.abs(path), axis=0) + 1e-300)))
-            result = trial
+            result, Phi = trial, run.Phi
             if change < CONVERGED:
                 break
         else:
             status, note = "not converged", f"the path still changed by {change:.1e} of its size after {ROUNDS} rounds"
         d = 0.5 * (result.before + result.after) @ noise
         steps = np.concatenate([record.dt[:1], record.dt])
-        P_d = noise / steps[:, None, None] - noise @ result.Before @ noise
+        # The mean over a step is (kick at its start + kick at its end) / dt; the first reaches its end through Phi.
+        both = (np.eye(len(noise)) + Phi) @ noise
+        P_d = noise / steps[:, None, None] - 0.25 * both.transpose(0, 2, 1) @ result.Before @ both
+        P_d[0] = P_d[1]
         J = cost(model, record, result.x, d, inverse, alpha, prior.R * steps[:, None])
         return Estimate(
             x=result.x, P=result.P, d=d, P_d=P_d, J=J, status=status, note=note, report={"rounds": float(rounds)}

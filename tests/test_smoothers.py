@@ -141,6 +141,43 @@ def test_minimum_model_error_solves_the_boundary_value_problem() -> None:
     assert found.status == "ok"
 
 
+def test_minimum_model_error_knows_its_error() -> None:
+    """P_d is what dense Gaussian conditioning on the readings leaves of the mean model error over each step (its two
+    kicks, half at the start and half at the end of the step), so that it has no negative eigenvalue; the first
+    sample, at which no step ends, has that of the first step.
+    """
+    record = record_of(OSCILLATOR)
+    N, n = len(record), 2
+    H = OSCILLATOR.output_jacobian(0.0, np.zeros(2))
+    # The unknowns in order: the first state, then each step's two kicks; `reach` makes a state of them.
+    V = np.zeros((n + 2 * n * (N - 1),) * 2)
+    V[:n, :n] = PRIOR.P0
+    reach, rows = np.zeros((n, len(V))), []
+    reach[:, :n] = np.eye(n)
+    rows.append(reach)
+    for k in range(1, N):
+        dt = record.t[k] - record.t[k - 1]
+        Phi = OSCILLATOR.transition(record.t[k - 1], np.zeros(2), (), dt)[1]
+        start, end = (slice(n + n * (2 * (k - 1) + half), n + n * (2 * (k - 1) + half + 1)) for half in (0, 1))
+        V[start, start] = V[end, end] = np.diag(PRIOR.Q) * dt / 2
+        reach = reach.copy()
+        reach[:, start] += np.eye(n)
+        reach = Phi @ reach
+        reach[:, end] += np.eye(n)
+        rows.append(reach)
+    seen = ~np.isnan(record.y).ravel()
+    A = np.concatenate([H @ part for part in rows])[seen]
+    left = V - V @ A.T @ np.linalg.solve(A @ V @ A.T + np.diag(np.tile(PRIOR.R, N)[seen]), A @ V)
+    P_d = MinimumModelError().estimate(OSCILLATOR, record).P_d
+    assert P_d is not None
+    for k in range(1, N):
+        first = n + 2 * n * (k - 1)
+        kicks = left[first : first + 2 * n, first : first + 2 * n].reshape(2, n, 2, n).sum(axis=(0, 2))
+        np.testing.assert_allclose(P_d[k], kicks / (record.t[k] - record.t[k - 1]) ** 2, rtol=1e-8, atol=1e-10)
+    np.testing.assert_array_equal(P_d[0], P_d[1])
+    assert np.linalg.eigvalsh(P_d).min() > 0.0
+
+
 def test_the_random_walk_smoother_knows_its_error() -> None:
     """A constant disturbance is recovered: within three of the standard deviations that P_d states, at most samples."""
     pushed = OSCILLATOR.plus("x1", "+0.8", {})
