@@ -15,10 +15,8 @@ import numpy.typing as npt
 from scipy.optimize import brentq
 from scipy.special import erf
 
-GROWTH = 1.5
-# Beyond so many sd an innovation counts as this: one outlier is no failing model.
-CLIP = 3.0
-A, B = 0.5 * (1.0 - GROWTH**-2), math.log(GROWTH)
+from suite.kernels.watch import CLIP, SINCE, A, B, cusum
+
 CELLS = 100
 
 
@@ -53,34 +51,17 @@ class Alarm:
     """The test, sample by sample. `since` is the time from which on the model has failed, None while it has not.
 
     `rate`: false alarms a sample, while `channels` innovations a sample come. An alarm ends when the sum is back at 0.
+    `test` is all that the kernel takes: the limit, the sum, and its two times.
     """
 
     def __init__(self, rate: float, channels: int) -> None:
-        self.limit = limit_for(channels / rate)
-        self.started: float | None = None
-        self.since: float | None = None
-        self.reset()
-
-    def reset(self) -> None:
-        """Know of nothing."""
-        self.g, self.started, self.since = 0.0, None, None
+        self.test = np.array([limit_for(channels / rate), 0.0, np.nan, np.nan])
 
     @property
-    def statistic(self) -> float:
-        """The sum over its limit: 1 raises the alarm."""
-        return self.g / self.limit
+    def since(self) -> float | None:
+        """The time from which on the model has failed."""
+        return None if math.isnan(self.test[SINCE]) else float(self.test[SINCE])
 
     def add(self, t: float, innovations: npt.NDArray[np.float64]) -> None:
         """The innovations (channels,) of one sample over their sd; NaN was not measured, infinite is a lost filter."""
-        for e in innovations.tolist():
-            if math.isnan(e):
-                continue
-            g = min(self.g + A * min(e * e, CLIP**2) - B, self.limit)
-            if g <= 0.0:
-                self.reset()
-                continue
-            self.g = g
-            if self.started is None:
-                self.started = t
-            if g >= self.limit:
-                self.since = self.started
+        cusum(self.test, t, innovations)

@@ -18,11 +18,12 @@ from suite.discovery.noise import noise_variance
 from suite.disturbance import CHANGES, SHARE
 from suite.errors import DataError
 from suite.following import follow, uncertain
+from suite.kernels.watch import watched
 from suite.least_squares import MEMORY, LeastSquares
 from suite.model import Model
 from suite.prior import default_prior
 from suite.record import Prior, Record
-from suite.streaming import Filter, deviations
+from suite.streaming import Filter
 
 Array = npt.NDArray[np.float64]
 
@@ -72,40 +73,36 @@ class Watcher:
         size = np.sqrt(np.mean(np.square(rates), axis=0))
         if not np.all(np.isfinite(size)):
             raise DataError(f"{first.source}: the model leaves every bound on the first {len(first)} samples; refit it")
-        self._null = Filter(*follow(model, prior, own))
-        self._error = Filter(*follow(*_disturbed(model, prior, size, memory), own))
-        self._effect = None
+        null, error = Filter(*follow(model, prior, own)), Filter(*follow(*_disturbed(model, prior, size, memory), own))
+        m, suspects, count = len(model.outputs), len(model.suspects), len(self.coefficients) if effect else 0
         if effect is not None:
             sds = _plausible(effect, self.coefficients, first, path, size)
-            self._effect = LeastSquares(effect, prior, sds, own, memory, len(model.outputs))
-        self._alarm, self._fits = Alarm(rate, len(model.outputs)), Alarm(FALSE_ALARMS, len(model.outputs))
-        self._suspects = len(model.suspects)
+            squares = LeastSquares(effect, prior, sds, own, memory, m)
+            followed, fit = squares.filter, squares.fit
+        else:
+            # No coefficient is followed, so the kernel looks at neither.
+            followed, fit = null, np.zeros(0)
+        alarm, fits = Alarm(rate, m), Alarm(FALSE_ALARMS, m)
+        ends = np.cumsum([m, suspects, suspects, count, count, 3]).tolist()
+        self._out = np.zeros(ends[-1])
+        self._cuts = [slice(*ends[i : i + 2]) for i in range(4)]
+        self._innovation = slice(0, m)
+        # What the filters' numbers live in, and the programs that own the addresses in them.
+        self._kept = (null, error, followed)
+        vectors = [vector for run in self._kept for vector in (run.whole, run.real)]
+        self._fixed = (self._n, suspects, count, *vectors, fit, alarm.test, fits.test, self._out)
         self._quiet = len(first)  # samples that still belong to the first stretch
 
     def add(self, t: float, u: Array, y: Array) -> Reading:
         """Take one sample: time, inputs (inputs,), outputs (outputs,) with NaN where missing. Time must increase."""
-        null, error, effect = self._null, self._error, self._effect
-        null.add(t, u, y)
-        error.add(t, u, y)
-        innovation = null.innovation.copy()
         self._quiet -= 1
-        if self._quiet < 0:
-            self._alarm.add(t, innovation)
-        own = slice(self._n, self._n + self._suspects)
-        value = sd = np.zeros(0)
-        if effect is not None:
-            effect.add(t, u, y)
-            if self._quiet < 0:
-                self._fits.add(t, effect.filter.innovation)
-                if self._fits.since is not None:
-                    # What was learnt is of the plant before; the filter with d knows where the plant is.
-                    effect.restart(error.x[: self._n], error.P[: self._n, : self._n])
-                    self._fits.reset()
-            value, sd = effect.value, effect.sd
-        lost = null.lost or error.lost or (effect is not None and effect.filter.lost)
+        watched(t, u, y, self._quiet >= 0, *self._fixed)
+        out = self._out.copy()
+        statistic, since, lost = out[-3:].tolist()
+        d, d_sd, value, sd = self._cuts
         return Reading(
-            t, innovation, error.x[own].copy(), deviations(error.P, own), value, sd,
-            self._alarm.statistic, self._alarm.since, lost,
+            t, out[self._innovation], out[d], out[d_sd], out[value], out[sd], statistic,
+            None if since != since else since, lost > 0.0,
         )  # fmt: skip
 
 
