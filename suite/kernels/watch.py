@@ -71,6 +71,14 @@ def age(n: int, real: Any, fit: Any, states: int, t: float, y: Any) -> None:
     fit[LAST] = t
 
 
+@compile_kernel(nb.types.void(nb.VECTOR, nb.VECTOR))
+def learn(fit: Any, e: Any) -> None:
+    """Reckon the misfit with the innovations e (outputs,) of a sample over their sd. Writes fit."""
+    for c in range(e.shape[0]):
+        if math.isfinite(e[c]):
+            fit[MISFIT] += fit[SHARE] * (e[c] * e[c] - fit[MISFIT])
+
+
 @compile_kernel(nb.types.void(nb.INT, nb.VECTOR, nb.VECTOR, nb.INT, nb.INT, nb.VECTOR))
 def restart(n: int, real: Any, fit: Any, states: int, other: int, better: Any) -> None:
     """Know of the parameters what was known at first, of the model's states what another filter does.
@@ -131,9 +139,7 @@ def watched(
     if coefficients > 0:
         m = effect_whole[STATES]
         e = effect[m + m * m : m + m * m + outputs]
-        for c in range(outputs):
-            if math.isfinite(e[c]):
-                fit[MISFIT] += fit[SHARE] * (e[c] * e[c] - fit[MISFIT])
+        learn(fit, e)
         if quiet == 0:
             cusum(fits, t, e)
             if not math.isnan(fits[SINCE]):
