@@ -34,6 +34,10 @@ def samples(lines: Iterable[str], model: Model, source: str) -> Iterator[Sample]
             yield sample
 
 
+def _missing(cell: str) -> bool:
+    return cell.strip().lower() in MISSING
+
+
 class _Reader:
     """The columns, and what the last line said."""
 
@@ -53,18 +57,21 @@ class _Reader:
         self.names = names
         self.columns = [names.index(column) for column in (time, *wanted)]
         self.inputs = len(model.inputs)
-        self.t, self.u = -math.inf, np.full(self.inputs, np.nan)
+        self.t, self.u = -math.inf, [math.nan] * self.inputs
 
     def cells(self, line: str) -> list[str]:
+        if '"' not in line:
+            return line.rstrip("\r\n").split(self.mark)
         return next(csv.reader([line.rstrip("\r\n")], delimiter=self.mark, skipinitialspace=True), [])
 
     def sample(self, at: int, line: str) -> Sample | None:
         """The sample in line `at`, None where every cell is empty."""
-        cells = self.cells(line)
-        if all(cell.strip().lower() in MISSING for cell in cells):
+        cells, width = self.cells(line), len(self.names)
+        # A line in which every cell is empty has no time either.
+        if (len(cells) < width or _missing(cells[self.columns[0]])) and all(map(_missing, cells)):
             return None
-        if len(cells) < len(self.names) or any(cell.strip() for cell in cells[len(self.names) :]):
-            raise self.refuse(at, f"{len(cells)} cells under {len(self.names)} column names", "give each its cell")
+        if len(cells) != width and (len(cells) < width or any(cell.strip() for cell in cells[width:])):
+            raise self.refuse(at, f"{len(cells)} cells under {width} column names", "give each its cell")
         numbers = [self.number(at, cells[column], self.names[column]) for column in self.columns]
         t = numbers[0]
         if math.isnan(t):
@@ -72,17 +79,24 @@ class _Reader:
         if t <= self.t:
             raise self.refuse(at, f"time does not increase ({t!r} after {self.t!r})", "send the samples in order")
         self.t = t
-        given = np.array(numbers[1 : 1 + self.inputs])
-        u = np.where(np.isnan(given), self.u, given)
-        if np.isnan(u).any():
-            name = self.names[self.columns[1 + int(np.argmax(np.isnan(u)))]]
-            raise self.refuse(at, f"the input {name} is empty at the start", "begin where it is known")
-        self.u = u
-        return t, u, np.array(numbers[1 + self.inputs :])
+        given = numbers[1 : 1 + self.inputs]
+        self.u = [old if math.isnan(new) else new for new, old in zip(given, self.u, strict=True)]
+        for place, value in enumerate(self.u):
+            if math.isnan(value):
+                name = self.names[self.columns[1 + place]]
+                raise self.refuse(at, f"the input {name} is empty at the start", "begin where it is known")
+        # The type is said, for a model without inputs has an empty list.
+        return t, np.array(self.u, dtype=np.float64), np.array(numbers[1 + self.inputs :], dtype=np.float64)
 
     def number(self, at: int, cell: str, name: str) -> float:
         text = cell.strip()
-        if text.lower() in MISSING:
+        try:
+            value = float(text)
+            if math.isfinite(value) and "_" not in text:
+                return value
+        except ValueError:
+            pass
+        if _missing(text):
             return math.nan
         if self.mark != "," and DECIMAL_COMMA.match(text):
             text = text.replace(",", ".")

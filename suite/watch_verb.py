@@ -20,6 +20,7 @@ from suite.sample_lines import Sample, samples
 from suite.watch import FALSE_ALARMS, Reading, Watcher
 
 FIRST, FIRST_BLIND = 40, 200  # samples to set up on: where the sensors' noise is stated, and where it is not
+ENCODE = json.JSONEncoder(ensure_ascii=False).encode  # json.dumps would make one a sample
 LEAST = 8  # readings of every output that it takes to see its noise
 
 
@@ -134,11 +135,11 @@ def _readings(watcher: Watcher, coming: Iterator[Sample]) -> Iterator[Reading]:
 
 
 def _as_csv(reading: Reading) -> str:
-    pairs = chain.from_iterable(
-        zip(values, sds, strict=True)
-        for values, sds in ((reading.d, reading.d_sd), (reading.coefficients, reading.coefficients_sd))
-    )
-    numbers = [*reading.innovation, *chain.from_iterable(pairs), reading.statistic]
+    numbers = reading.innovation.tolist()
+    for values, sds in ((reading.d, reading.d_sd), (reading.coefficients, reading.coefficients_sd)):
+        for pair in zip(values.tolist(), sds.tolist(), strict=True):
+            numbers += pair
+    numbers.append(reading.statistic)
     cells = [f"{number:.6g}" if math.isfinite(number) else "" for number in numbers]
     return ",".join([repr(reading.t), *cells, "" if reading.since is None else repr(reading.since)])
 
@@ -146,22 +147,24 @@ def _as_csv(reading: Reading) -> str:
 def _as_json(model: Model, names: Sequence[str], effect: str | None, equation: str, reading: Reading) -> str:
     def pairs(keys: Sequence[str], values: Any, sds: Any) -> dict[str, dict[str, float | None]]:
         return {
-            key: {"value": _finite(value), "sd": _finite(sd)} for key, value, sd in zip(keys, values, sds, strict=True)
+            key: {"value": _finite(value), "sd": _finite(sd)}
+            for key, value, sd in zip(keys, values.tolist(), sds.tolist(), strict=True)
         }
 
     found = pairs(names, reading.coefficients, reading.coefficients_sd)
-    return json.dumps(
+    return ENCODE(
         {
             "t": reading.t,
-            "innovation": {name: _finite(e) for name, e in zip(model.outputs, reading.innovation, strict=True)},
+            "innovation": {
+                name: _finite(e) for name, e in zip(model.outputs, reading.innovation.tolist(), strict=True)
+            },
             "d": pairs(model.suspects, reading.d, reading.d_sd),
             "effect": None if effect is None else {"effect": effect, "equation": equation, "coefficients": found},
             "statistic": reading.statistic,
             "alarm": None if reading.since is None else {"since": reading.since},
-        },
-        ensure_ascii=False,
+        }
     )
 
 
 def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
+    return value if math.isfinite(value) else None
