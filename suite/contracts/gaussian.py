@@ -6,6 +6,7 @@ No recursion of Kalman's is used: all states of all samples are one Gaussian vec
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal, get_args
 
 import numpy as np
@@ -31,11 +32,16 @@ class Path:
     covariance: Array
     H: Array
 
+    @cached_property
+    def root(self) -> Array:
+        """A square root of the covariance, (N n, N n), which is singular where the first state or a step is certain."""
+        values, vectors = np.linalg.eigh(self.covariance)
+        root: Array = vectors * np.sqrt(np.maximum(values, 0.0))
+        return root
+
     def drawn(self, rng: np.random.Generator) -> Array:
         """One realisation, (N, n)."""
-        values, vectors = np.linalg.eigh(self.covariance)
-        noise = rng.standard_normal(len(values)) * np.sqrt(np.maximum(values, 0.0))
-        offset: Array = np.reshape(vectors @ noise, self.mean.shape)
+        offset: Array = np.reshape(self.root @ rng.standard_normal(len(self.root)), self.mean.shape)
         return self.mean + offset
 
     def given(self, y: Array, R: Array, *, causal: bool) -> tuple[Array, Array]:
