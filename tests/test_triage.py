@@ -10,6 +10,7 @@ import pytest
 
 from suite import plugins
 from suite.case import Case
+from suite.discovery.checkup import check
 from suite.discovery.verdict import diagnose
 from suite.model import Input, Model, Parameter
 from suite.record import Record
@@ -125,3 +126,29 @@ def test_a_sound_measurement_of_a_complete_model_shows_no_fault(seed: int) -> No
     """Nothing wrong with sensor, input, numbers and clock: the model is adequate."""
     verdict = diagnose(MODEL, plain(seed=seed), EFFECTS)
     assert (verdict.verdict, verdict.effects) == ("adequate", ())
+
+
+MISTAKES = {
+    "a sensor upside down": ("two-masses-cubic", [0], None, "x2 fits with the other sign"),
+    "an output of two": ("paper-cubic", [0], None, "x1 fits with the other sign"),
+    "two outputs swapped": ("tank-second-outlet", [], (0, 1), "h1 and h2 fit in each other's place"),
+    "an input": ("boat-drag", [1], None, "fits with the other sign"),
+}
+
+
+@pytest.mark.parametrize(("name", "flipped", "swapped", "said"), MISTAKES.values(), ids=MISTAKES.keys())
+def test_check_names_a_mistake_with_columns(
+    name: str, flipped: list[int], swapped: tuple[int, int] | None, said: str
+) -> None:
+    """Though the model lacks an effect as well; and of the right columns it says nothing."""
+    case = plugins.cases()[name]
+    record, _ = case.simulate(0.05, 1)
+    columns = np.column_stack([record.y, record.u])
+    m = record.y.shape[1]
+    columns[:, flipped] *= -1.0
+    if swapped is not None:
+        columns[:, list(swapped)] = columns[:, list(swapped)[::-1]]
+    mistaken = check(case.deficient, replace(record, y=columns[:, :m].copy(), u=columns[:, m:].copy())).findings
+    assert any(said in finding for finding in mistaken)
+    right = check(case.deficient, record).findings
+    assert not any("other sign" in finding or "other's place" in finding for finding in right)

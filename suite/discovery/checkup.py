@@ -13,6 +13,7 @@ from suite.discovery import determined
 from suite.discovery.engine import Problem
 from suite.discovery.fit import Hypothesis, homotopy, levenberg_marquardt, prepare
 from suite.discovery.identify import ALARM
+from suite.discovery.mixups import mixups
 from suite.discovery.noise import OUTLIER, noise_variance, spikes
 from suite.model import Hold, Model
 from suite.record import Record
@@ -44,6 +45,7 @@ def check(model: Model, record: Record) -> Checkup:
     at = level.exact if np.isfinite(level.exact.L) else level.best
     facts["undetermined"] = determined.facts(problem, at, level.layout)
     findings += determined.findings(problem, at, level.layout)
+    findings += [mixup.sentence for mixup in mixups(model, record, level)[:1]]
     if model.inputs:
         _holds(problem, level, findings)
     facts["input_delay"] = _delays(problem, level.exact.point, findings) if model.inputs else {}

@@ -26,7 +26,7 @@ CLOSE = 25.0  # rivals within this of the best are converged before weights are 
 ALARM = 9.0  # Lambda above which the model fails
 LOUD = 25.0  # of the noise's variance: an error from which the model fails whatever a process noise is worth
 SWAPPED = 6  # candidates that are refitted in the place of each member of the best set
-ROUNDS = 5  # times that swapping goes on from the best set that it led to
+ROUNDS = 3  # times that swapping goes on from the best set that it led to
 WORTH = 0.7  # of the error's variance: what a further effect must leave less than, for yet another to be sought
 PAIRS = 4  # pairs that are refitted because they help together, at each of two levels
 
@@ -174,7 +174,7 @@ def _grow(found: Search) -> Search:
         if frozenset(rest) not in known:
             known[frozenset(rest)] = homotopy(problem, grown.exact.point, rest, first=0.01, tolerance=0.1)
         parent = known[frozenset(rest)]
-        return parent, score(problem, parent, skip=(*found.absorbed, k))
+        return parent, score(problem, parent, skip=(*found.absorbed, k), beside=0)
 
     for size in (2, 3):
         beam = sorted((h for h in known.values() if len(h.active) == size - 1), key=found.criterion)[:BEAM]
@@ -186,7 +186,7 @@ def _grow(found: Search) -> Search:
             for entry in score(problem, parent, skip=found.absorbed)[:NEXT]:
                 extend(parent, [entry])
             # A force that bends off at a width of its own imitates a polynomial of one term more.
-            for k in filter(bent, parent.active) if size == 3 else ():
+            for k in filter(bent, parent.active) if size == 3 and parent is beam[0] else ():
                 rest, scores = without(parent, k)
                 for both in pairs(problem, rest, scores, 2):
                     extend(rest, both)
@@ -197,7 +197,8 @@ def _grow(found: Search) -> Search:
                 rest, scores = without(grown, k)
                 for entry in scores[:SWAPPED]:
                     extend(rest, [entry])
-            if min([found.base, *known.values()], key=found.criterion) is grown:
+            swapped = min([found.base, *known.values()], key=found.criterion)
+            if found.criterion(swapped) > found.criterion(grown) - ALARM:
                 break
         fitted = _converged(found, list(known.values()))
         known = {frozenset(hypothesis.active): hypothesis for hypothesis in fitted}

@@ -48,15 +48,19 @@ class Score:
     length: float
 
 
-def score(problem: Problem, hypothesis: Hypothesis, skip: Iterable[int] = (), exact: bool = False) -> list[Score]:
-    """All candidates that are not active, best first: at the likeliest level and a decade either side, or at q = 0."""
+def score(
+    problem: Problem, hypothesis: Hypothesis, skip: Iterable[int] = (), exact: bool = False, beside: int = 1
+) -> list[Score]:
+    """All candidates that are not active, best first: at the likeliest level and `beside` decades either side, or
+    (`exact`) at q = 0.
+    """
     left_out = {*skip, *hypothesis.active}
     best: dict[int, Score] = {}
     levels = [level for level in hypothesis.levels if np.isfinite(level.L)]
     if not levels:
         return []
     at = min(range(len(levels)), key=lambda i: levels[i].L)
-    for level in [levels[-1]] if exact else levels[max(at - 1, 0) : at + 2]:
+    for level in [levels[-1]] if exact else levels[max(at - beside, 0) : at + beside + 1]:
         # A tone is looked for where the errors at the likeliest level repeat; elsewhere its size alone is asked for.
         tones = frequencies(problem)[::FEW] if exact else _peaks(problem, level) if level is levels[at] else ()
         for entry in _scores_at(problem, hypothesis, level, left_out, tones):
