@@ -12,17 +12,22 @@ from typing import Any
 
 import pytest
 
+from suite.__main__ import main
+from suite.benchmark.store import Store
+
 HERE = Path(__file__).parent / "foreign_package"
 Run = Callable[..., Any]
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """A command of a fresh process that has the foreign distribution installed; its JSON."""
+    """A command of a fresh process that has the foreign distribution and one that `new` wrote installed; its JSON."""
     pytest.importorskip("hatchling", reason="the foreign package is built without the network")
     folder = tmp_path_factory.mktemp("foreign")
+    assert main(["new", "estimator", "my-own", "--package", "-o", str(folder)]) == 0
     pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index", "--no-build-isolation"]
-    subprocess.run([*pip, "--target", str(folder / "site"), str(HERE)], check=True, timeout=120)
+    packages = [str(HERE), str(folder / "my-own")]
+    subprocess.run([*pip, "--target", str(folder / "site"), *packages], check=True, timeout=240)
 
     def command(*args: str) -> Any:
         done = subprocess.run(
@@ -36,6 +41,12 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     return command
 
 
+@pytest.fixture(scope="module")
+def listed(run: Run) -> Any:
+    """What `list` says there."""
+    return run("list")
+
+
 def test_the_foreign_estimator_is_at_most_40_lines_of_plain_numpy() -> None:
     """The class and its imports fit on one screen, and know nothing of kernels."""
     text = (HERE / "alpha_beta.py").read_text(encoding="utf-8").split("class Taken")[0]
@@ -43,9 +54,9 @@ def test_the_foreign_estimator_is_at_most_40_lines_of_plain_numpy() -> None:
     assert "kernels" not in text
 
 
-def test_foreign_plug_ins_are_listed_and_those_that_fail_say_why(run: Run) -> None:
+def test_foreign_plug_ins_are_listed_and_those_that_fail_say_why(listed: Any) -> None:
     """Estimator, case and effect come by entry point; a lost module and a name of ours are refused, ours stays."""
-    found = run("list")
+    found = listed
     assert "alpha-beta" in found["estimators"]["loaded"]
     assert "leaking-tank" in found["cases"]["loaded"]
     assert "magnet" in found["effects"]["loaded"]
@@ -65,7 +76,7 @@ def test_foreign_plug_ins_keep_the_contract(run: Run) -> None:
 
 
 def test_the_foreign_estimator_is_in_the_matrix(run: Run, tmp_path: Path) -> None:
-    """Judged in worker processes on a case of ours and on the foreign one, beside a filter of ours."""
+    """Judged in a worker process on a case of ours and on the foreign one, beside a filter of ours."""
     plan = tmp_path / "foreign.toml"
     plan.write_text(
         'cases = ["leaking-tank", "paper-cubic"]\nestimators = ["alpha-beta", "ekf"]\nvariants = ["default"]\n'
@@ -73,25 +84,16 @@ def test_the_foreign_estimator_is_in_the_matrix(run: Run, tmp_path: Path) -> Non
         encoding="utf-8",
     )
     store = str(tmp_path / "store.sqlite")
-    done = run("bench", "run", "--plan", str(plan), "--store", store, "--jobs", "2")
+    done = run("bench", "run", "--plan", str(plan), "--store", store, "--jobs", "1")
     assert done["status"] == {"ok": 4}
-    rows = run("bench", "table", "--store", store, "--rows")
+    with Store(Path(store)) as kept:
+        rows = kept.rows()
     assert {(row["case"], row["estimator"]) for row in rows} == {
         (case, method) for case in ("leaking-tank", "paper-cubic") for method in ("alpha-beta", "ekf")
     }
     assert all(0 < row["state_nrmse"] < 1 for row in rows)
 
 
-def test_a_package_that_new_writes_is_found_when_installed(tmp_path: Path) -> None:
+def test_a_package_that_new_writes_is_found_when_installed(listed: Any) -> None:
     """`new --package`, pip install, `list`: the estimator is there under its name."""
-    pytest.importorskip("hatchling", reason="the package is built without the network")
-    new = [sys.executable, "-m", "suite", "new", "estimator", "my-own", "--package", "-o", str(tmp_path)]
-    subprocess.run(new, check=True, cwd=tmp_path, timeout=60, capture_output=True)
-    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index", "--no-build-isolation"]
-    subprocess.run([*pip, "--target", str(tmp_path / "site"), str(tmp_path / "my-own")], check=True, timeout=120)
-    env = {**os.environ, "PYTHONPATH": str(tmp_path / "site")}
-    listed = subprocess.run(
-        [sys.executable, "-m", "suite", "list", "--json"],
-        cwd=tmp_path, env=env, capture_output=True, text=True, check=True, timeout=60,
-    )  # fmt: skip
-    assert "my-own" in json.loads(listed.stdout)["estimators"]["loaded"]
+    assert "my-own" in listed["estimators"]["loaded"]
