@@ -15,12 +15,14 @@ import pytest
 from suite.alarm import Alarm
 from suite.errors import DataError
 from suite.filtering import filtered
+from suite.following import follow, uncertain
+from suite.least_squares import LeastSquares
 from suite.model import Initial, Model, Output, Parameter
 from suite.model_file import write_model
 from suite.record import Prior, Record
 from suite.sample_lines import samples
 from suite.streaming import Filter
-from suite.watch import Watcher
+from suite.watch import Watcher, first_prior
 
 SIGMA, DT = 0.05, 0.05
 SPRING = Model(
@@ -67,6 +69,27 @@ def test_a_sample_at_a_time_is_the_batch_filter() -> None:
         np.testing.assert_allclose(stream.P, batch.P[k], rtol=1e-12, atol=1e-14)
         expected = np.nan if np.isnan(run.y[k, 0]) else batch.innovation[k, 0] / np.sqrt(batch.variance[k, 0])
         np.testing.assert_allclose(stream.innovation[0], expected, rtol=1e-12)
+
+
+def test_the_watcher_runs_its_filters_as_if_each_were_alone() -> None:
+    """Innovation, coefficient and its band are those of a filter and of least squares fed apart, with gaps."""
+    run = record(4, np.inf, 20.0)
+    run.y[np.random.default_rng(4).random(len(run)) < 0.2] = np.nan
+    first, own = run.part(0, 40), uncertain(SPRING)
+    watcher, prior = Watcher(SPRING, first, CUBIC, ["a"], memory=10.0), first_prior(SPRING, first)
+    plain = Filter(*follow(SPRING, prior, own))
+    start = watcher.add(float(run.t[0]), run.u[0], run.y[0])
+    squares = LeastSquares(CUBIC, prior, {"a": float(start.coefficients_sd[0])}, own, 10.0, 1)
+    for alone in (plain, squares):
+        alone.add(float(run.t[0]), run.u[0], run.y[0])
+    for t, u, y in zip(run.t[1:].tolist(), run.u[1:], run.y[1:], strict=True):
+        found = watcher.add(t, u, y)
+        plain.add(t, u, y)
+        squares.add(t, u, y)
+        np.testing.assert_allclose(found.innovation, plain.innovation, rtol=1e-12)
+        np.testing.assert_allclose(found.coefficients, squares.value, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(found.coefficients_sd, squares.sd, rtol=1e-9)
+    assert found.coefficients_sd[0] < 0.5 * start.coefficients_sd[0]
 
 
 @pytest.mark.parametrize("channels", [1, 3])
