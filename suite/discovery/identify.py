@@ -13,6 +13,7 @@ from suite.discovery.fit import LEVELS, RISEN, Hypothesis, Level, homotopy, poli
 from suite.discovery.frame import Point
 from suite.discovery.library import incompatible
 from suite.discovery.noise import spans
+from suite.discovery.patchwork import patched
 from suite.discovery.scoring import Score, absorbed, frequencies, is_tone, pairs, score
 from suite.discovery.starts import brought
 from suite.errors import DataError
@@ -176,6 +177,9 @@ def _grow(found: Search) -> Search:
         parent = known[frozenset(rest)]
         return parent, score(problem, parent, skip=(*found.absorbed, k), beside=0)
 
+    def sound() -> Hypothesis:
+        return min((h for h in (found.base, *known.values()) if not patched(problem, h)), key=found.criterion)
+
     for size in (2, 3):
         beam = sorted((h for h in known.values() if len(h.active) == size - 1), key=found.criterion)[:BEAM]
         best = min([found.base, *known.values()], key=found.criterion)
@@ -190,15 +194,14 @@ def _grow(found: Search) -> Search:
                 rest, scores = without(parent, k)
                 for both in pairs(problem, rest, scores, 2):
                     extend(rest, both)
-        # Swap and drop: the best set with each of its members replaced or removed, and again the one that this leads to.
+        # Swap and drop: the best set with each of its members replaced or removed, and again the one it leads to.
         for _ in range(ROUNDS):
-            grown = min([found.base, *known.values()], key=found.criterion)
+            grown = sound()
             for k in grown.active if len(grown.active) == size else ():
                 rest, scores = without(grown, k)
                 for entry in scores[:SWAPPED]:
                     extend(rest, [entry])
-            swapped = min([found.base, *known.values()], key=found.criterion)
-            if found.criterion(swapped) > found.criterion(grown) - ALARM:
+            if found.criterion(sound()) > found.criterion(grown) - ALARM:
                 break
         fitted = _converged(found, list(known.values()))
         known = {frozenset(hypothesis.active): hypothesis for hypothesis in fitted}

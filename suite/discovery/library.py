@@ -36,9 +36,9 @@ def candidates(
 
     The model's symmetries are kept: where no equation depends on a state's absolute value (height in free fall), no
     candidate of a rate may either, unless `absolute`, or unless its zero means something: a store's, which others fill,
-    or that of a state which the `record` shows going to and fro about it. Of two candidates of the same shape in one equation the first
-    stays, physics before a generic stand-in. The model's own effects come first; one that names its equation acts there
-    whatever is suspect.
+    or that of a state which the `record` shows going to and fro about it. Of two candidates of the same shape in one
+    equation the first stays, physics before a generic stand-in. The model's own effects come first; one that names its
+    equation acts there whatever is suspect.
     """
     effects = {effect.id: effect for effect in model.effects} | dict(effects)
     used = set().union(*(rate.free_symbols for rate in model.rates))

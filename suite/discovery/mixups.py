@@ -23,14 +23,16 @@ GAIN = 50.0  # of -2 ln likelihood: what undoing a mistake must gain at the like
 
 @dataclass(frozen=True)
 class Mixup:
-    """A mistake that would explain much of the error: what to write about it, and -2 ln likelihood gained by undoing."""
+    """A mistake that would explain much of the error: what to write about it, and what undoing it gains in -2 ln
+    likelihood.
+    """
 
     sentence: str
     gain: float
 
 
 def mixups(model: Model, record: Record, base: Hypothesis) -> list[Mixup]:
-    """The mistakes that are worth undoing, the likeliest first; nothing is looked for where the model explains the record.
+    """The mistakes that are worth undoing, the likeliest first; none where the model explains the record.
 
     They are compared with process noise in the model, which stands for whatever else it lacks: a model with a missing
     effect predicts the next samples badly, one with a wrong sign in a column worse.
