@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import wilcoxon
 
 from suite import along, plugins
 from suite.benchmark import claims, hashes, innovations, metrics, plan, sources, statistics, table
@@ -128,6 +129,30 @@ def test_an_angle_just_short_of_a_turn_is_a_small_error() -> None:
     assert np.isnan(missed[2, 0])
     with pytest.raises(ValueError, match=r"expected states of the shape \(3, 1\), got \(2, 1\)"):
         along.outputs(model, record, np.zeros((2, 1)))
+
+
+def test_statistics_of_many_lines_at_once_are_those_of_each() -> None:
+    """Intervals are those of 2000 plain resamples, p-values those of scipy's test of each pair, with failures,
+    which tie, and differences of zero among them.
+    """
+    rng = np.random.default_rng(1)
+    for count in (1, 2, 7, 20):
+        table = rng.lognormal(size=(5, count))
+        table[rng.random(table.shape) < 0.2] = np.inf
+        picks = np.random.default_rng(0).integers(0, count, (2000, count))
+        for values, found in zip(table, statistics.intervals(table), strict=True):
+            medians = np.sort(np.median(np.sort(values)[picks], axis=1))
+            assert found.tolist() == [np.median(values), medians[round(0.025 * 1999)], medians[round(0.975 * 1999)]]
+    pairs = []
+    for count in (3, 6, 6, 12, 25):
+        a, b = np.exp(rng.standard_normal((2, count)))
+        pairs.append((dict(enumerate(a)), dict(enumerate(b))))
+        a[0], a[1], a[2] = np.inf, np.inf, b[2]
+        pairs.append((dict(enumerate(a)), dict(enumerate(b))))
+    for (mine, base), p in zip(pairs, statistics.signed_ranks(pairs), strict=True):
+        gaps = np.array([np.log(mine[s] / base[s]) for s in mine])
+        gaps[np.isinf(gaps)] = 1e6
+        assert p == pytest.approx(float(wilcoxon(gaps).pvalue) if len(mine) > 4 else 1.0, rel=1e-12)
 
 
 def test_failures_rank_last_and_are_counted() -> None:

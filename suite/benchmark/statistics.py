@@ -21,18 +21,32 @@ def is_reference(row: Mapping[str, Any]) -> bool:
 
 def interval(values: Array, level: float = 0.95) -> tuple[float, float, float]:
     """Median and its bootstrap percentile interval; values that are not finite count as infinitely bad."""
-    values = np.sort(np.where(np.isnan(values), np.inf, values))
-    lower, upper = _middles(len(values))
-    medians = np.sort((values[lower] + values[upper]) / 2)
-    low, high = (medians[round(share * (RESAMPLES - 1))] for share in ((1 - level) / 2, (1 + level) / 2))
-    return float(np.median(values)), float(low), float(high)
+    middle, low, high = intervals(np.asarray(values)[None, :], level)[0]
+    return float(middle), float(low), float(high)
+
+
+def intervals(table: Array, level: float = 0.95) -> Array:
+    """`interval` of each row of a table (rows, values), as (rows, 3)."""
+    values = np.sort(np.where(np.isnan(table), np.inf, table), axis=1)
+    lower, upper, often = _middles(values.shape[1])
+    medians = (values[:, lower] + values[:, upper]) / 2
+    order = np.argsort(medians, axis=1)
+    passed = np.cumsum(often[order], axis=1)
+    rows, found = np.arange(len(values)), [np.median(values, axis=1)]
+    for share in ((1 - level) / 2, (1 + level) / 2):
+        place = np.argmax(passed > round(share * (RESAMPLES - 1)), axis=1)
+        found.append(medians[rows, order[rows, place]])
+    return np.stack(found, axis=1)
 
 
 @cache
-def _middles(count: int) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """Where the two middle values of each resample stand among `count` sorted values: its median needs no more."""
+def _middles(count: int) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """Where the two middle values of a resample stand among `count` sorted values, and how many resamples have them
+    there: a median needs no more.
+    """
     picks = np.sort(np.random.default_rng(0).integers(0, count, (RESAMPLES, count)), axis=1)
-    return picks[:, (count - 1) // 2].copy(), picks[:, count // 2].copy()
+    pairs, often = np.unique(picks[:, [(count - 1) // 2, count // 2]], axis=0, return_counts=True)
+    return pairs[:, 0].copy(), pairs[:, 1].copy(), often
 
 
 def wilson(hits: int, count: int, level: float = 0.95) -> tuple[float, float, float]:
@@ -81,13 +95,44 @@ def signed_rank(mine: Mapping[int, float], reference: Mapping[int, float]) -> fl
 
     A failure is a difference above all others, so that it counts against who failed.
     """
+    return signed_ranks([(mine, reference)])[0]
+
+
+def signed_ranks(pairs: Sequence[tuple[Mapping[int, float], Mapping[int, float]]]) -> list[float]:
+    """`signed_rank` of each pair."""
+    found = [1.0] * len(pairs)
+    alike: dict[int, list[tuple[int, Array]]] = {}
+    for i, (mine, reference) in enumerate(pairs):
+        gaps = _gaps(mine, reference)
+        if len(gaps) <= 4 or not np.any(gaps != 0):
+            continue
+        if len(np.unique(np.abs(gaps))) == len(gaps) and np.all(gaps != 0):
+            alike.setdefault(len(gaps), []).append((i, gaps))
+        else:
+            # How scipy takes ties and zeros depends on the sample, so each is tested alone, and once: failures tie.
+            found[i] = _tied(tuple(np.sort(np.sign(gaps) * rankdata(np.abs(gaps))).tolist()))
+    for entries in alike.values():
+        p = np.atleast_1d(wilcoxon(np.array([gaps for _, gaps in entries]), axis=1).pvalue)
+        for (i, _), value in zip(entries, p.tolist(), strict=True):
+            found[i] = value
+    return found
+
+
+@cache
+def _tied(ranks: tuple[float, ...]) -> float:
+    """The p-value of signed ranks; those of 0 are differences of zero."""
+    return float(wilcoxon(np.array(ranks)).pvalue)
+
+
+def _gaps(mine: Mapping[int, float], reference: Mapping[int, float]) -> Array:
+    """Differences of the logarithms on common seeds; those of failures lie beyond all others."""
     a, b = (np.array([table[s] for s in mine if s in reference], dtype=np.float64) for table in (mine, reference))
     with np.errstate(divide="ignore", invalid="ignore"):
         gaps = np.log(a) - np.log(b)
     gaps[np.isnan(gaps)] = 0.0  # both failed, or both are exact
     beyond = 1.0 + float(np.abs(gaps[np.isfinite(gaps)]).max(initial=0.0))
-    gaps = np.clip(gaps, -beyond, beyond)
-    return float(wilcoxon(gaps).pvalue) if len(gaps) > 4 and np.any(gaps != 0) else 1.0
+    kept: Array = np.clip(gaps, -beyond, beyond)
+    return kept
 
 
 def ranks(scores: Mapping[str, Mapping[Any, float]]) -> dict[str, float]:
@@ -116,22 +161,30 @@ def summarise(
     for row in rows:
         groups.setdefault((row["case"], row["noise"], row["estimator"], row["variant"]), []).append(row)
     lines: list[dict[str, Any]] = []
+    # What is computed for many lines at once: where it belongs and its values.
+    spreads: list[tuple[dict[str, Any], str, Array]] = []
+    tested: list[tuple[dict[str, Any], dict[int, float], dict[int, float]]] = []
     for (case, noise, estimator, variant), group in groups.items():
         line: dict[str, Any] = {"case": case, "noise": noise, "estimator": estimator, "variant": variant}
         line |= {"seeds": len(group), "ok": sum(row["status"] == "ok" for row in group)}
         line["reason"] = next((row["reason"] for row in group if row["reason"]), "")
         for metric in metrics:
             if any(row.get(metric) is not None for row in group):
-                middle, low, high = interval(np.array([score(row, metric) for row in group]))
-                line |= {metric: middle, f"{metric}_low": low, f"{metric}_high": high}
+                line |= dict.fromkeys((metric, f"{metric}_low", f"{metric}_high"))
+                spreads.append((line, metric, np.array([score(row, metric) for row in group])))
         mine = {row["seed"]: score(row, "state_nrmse") for row in group}
         base = {row["seed"]: score(row, "state_nrmse") for row in groups.get((case, noise, reference, "default"), [])}
-        ratio = paired_ratio(mine, base)
-        if ratio is not None:
-            line |= dict(zip(("ratio", "ratio_low", "ratio_high"), ratio, strict=True))
-            line["p"] = signed_rank(mine, base)
+        found = ratios(mine, base)
+        if len(found):
+            line |= dict.fromkeys(("ratio", "ratio_low", "ratio_high"))
+            spreads.append((line, "ratio", found))
+            tested.append((line, mine, base))
         lines.append(line)
-    tested = [line for line in lines if "p" in line]
-    for line, p in zip(tested, holm([line["p"] for line in tested]), strict=True):
-        line["p"] = p
+    for count in {len(values) for _, _, values in spreads}:
+        alike = [entry for entry in spreads if len(entry[2]) == count]
+        for (line, name, _), spread in zip(alike, intervals(np.array([v for _, _, v in alike])).tolist(), strict=True):
+            line |= dict(zip((name, f"{name}_low", f"{name}_high"), spread, strict=True))
+    p = holm(signed_ranks([(mine, base) for _, mine, base in tested]))
+    for (line, _, _), adjusted in zip(tested, p, strict=True):
+        line["p"] = adjusted
     return sorted(lines, key=lambda line: (line["case"], line["noise"], line.get("state_nrmse", np.inf)))
