@@ -99,9 +99,11 @@ class Bench:
         """How often each cell was computed to its end."""
         return Counter(self.calls.read_text().splitlines())
 
-    def until(self, count: int) -> None:
-        give_up = time.monotonic() + 120
+    def until(self, count: int, running: subprocess.Popen[str]) -> None:
+        """Wait until so many cells are computed, while the run goes on."""
+        give_up = time.monotonic() + 240
         while self.computed().total() < count:
+            assert running.poll() is None, running.communicate()
             assert time.monotonic() < give_up
             time.sleep(0.02)
 
@@ -119,7 +121,7 @@ def test_kill_9_of_the_whole_group_loses_and_repeats_nothing(bench: Bench) -> No
     """Parent and workers killed at once: the next run computes what is not stored, and only cells in hand twice."""
     words = ("run", "--plan", bench.plan("y-slow", 30), "--jobs", "1", "--json")
     process = bench.start(*words)
-    bench.until(8)
+    bench.until(8, process)
     os.killpg(process.pid, signal.SIGKILL)
     process.communicate()
     kept, before = len(bench.rows()), bench.computed().total()
@@ -144,7 +146,7 @@ def test_an_interrupt_ends_in_a_sentence(bench: Bench) -> None:
     """Ctrl-C at the terminal, which goes to the whole group: code 130, one sentence, what was finished is stored."""
     words = ("run", "--plan", bench.plan("y-slow", 200), "--jobs", "1")
     process = bench.start(*words)
-    bench.until(4)
+    bench.until(4, process)
     os.killpg(process.pid, signal.SIGINT)
     said = bench.done(process, 130)
     assert said.splitlines()[-1] == "unmodelled: stopped; what was finished is kept"
@@ -235,7 +237,7 @@ def test_a_cluster_that_loses_a_worker_loses_no_cell(bench: Bench) -> None:
         address = process.stdout.readline().strip()
         words = ("run", "--plan", bench.plan("y-slow", 20), "--dask", address, "--json")
         running = bench.start(*words)
-        bench.until(2)
+        bench.until(2, running)
         with distributed.Client(address, set_as_default=False) as client:
             pids = client.run(os.getpid)
             os.kill(next(iter(pids.values())), signal.SIGKILL)
