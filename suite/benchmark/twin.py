@@ -81,8 +81,8 @@ METHODS = {
         0.65,
         lambda model, record, prior, seed: ensemble(model, record, prior, members=10, inflation=1.04).x,
     ),
-    # filterpy's perturbations do not add up to zero, DAPPER's do. In three runs of ten members this went with a need for
-    # more inflation; whether it is the cause was not tested.
+    # filterpy's perturbations do not add up to zero, DAPPER's do. In three runs, ten members needed more inflation;
+    # whether that is the cause was not tested.
     "enkf-perturbed-10-inflated": Method(
         "ensemble Kalman filter with perturbed readings (filterpy), 10 members, inflation 1.2, "
         "the best of 1.04, 1.1, 1.2 and 1.3 on runs 0 to 2 (published: 1.04)",
