@@ -61,5 +61,5 @@ def _rule(table: Any, variants: Sequence[str], where: str) -> Rule:
         count = table.get(key, 1)
         if not isinstance(count, int) or isinstance(count, bool) or count < 1:
             raise InputError(f"{where}: {key} = {count!r}; expected a whole number above zero")
-    entries: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}
-    return Rule(**entries)
+    fields: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}
+    return Rule(**fields)
