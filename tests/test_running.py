@@ -247,6 +247,7 @@ def test_a_cluster_that_loses_a_worker_loses_no_cell(bench: Bench) -> None:
     finally:
         process.stdin.close()
         process.wait(timeout=60)
+        process.stdout.close()
     assert done["status"] == {"ok": 20}
     assert failed["status"] == {"time-out": 1}
     assert len(bench.rows()) == 21
