@@ -13,7 +13,7 @@ from suite.discovery.fit import LEVELS, RISEN, Hypothesis, Level, homotopy, poli
 from suite.discovery.frame import Point
 from suite.discovery.library import incompatible
 from suite.discovery.noise import spans
-from suite.discovery.patchwork import patched
+from suite.discovery.patchwork import doubled
 from suite.discovery.scoring import Score, absorbed, frequencies, is_tone, pairs, score
 from suite.discovery.starts import brought
 from suite.errors import DataError
@@ -178,7 +178,7 @@ def _grow(found: Search) -> Search:
         return parent, score(problem, parent, skip=(*found.absorbed, k), beside=0)
 
     def sound() -> Hypothesis:
-        return min((h for h in (found.base, *known.values()) if not patched(problem, h)), key=found.criterion)
+        return min((h for h in (found.base, *known.values()) if not doubled(problem, h)), key=found.criterion)
 
     for size in (2, 3):
         beam = sorted((h for h in known.values() if len(h.active) == size - 1), key=found.criterion)[:BEAM]

@@ -8,15 +8,20 @@ from suite.discovery.library import triage
 
 
 def patched(problem: Problem, hypothesis: Hypothesis) -> bool:
-    """Whether effects of one law act together in one equation, or a shape stands for no physics at all: they imitate
-    one law that the library does not hold, at the price of one law less than they are. Two faults of the instruments
-    at once imitate anything as well.
+    """Whether effects stand in for one law that the library does not hold: `doubled` ones, at the price of one law less
+    than they are, or a shape that stands for no physics at all.
+    """
+    terms = [problem.terms[k] for k in hypothesis.active]
+    return doubled(problem, hypothesis) or any(term.effect.generic and term.effect.inner for term in terms)
+
+
+def doubled(problem: Problem, hypothesis: Hypothesis) -> bool:
+    """Whether effects of one law act together in one equation, or two faults of the instruments, which imitate
+    anything as well.
     """
     terms = [problem.terms[k] for k in hypothesis.active]
     laws = [(term.equation, term.effect.law) for term in terms if term.effect.law]
-    if sum(map(triage, terms)) > 1:
-        return True
-    return len(laws) > len(set(laws)) or any(term.effect.generic and term.effect.inner for term in terms)
+    return len(laws) > len(set(laws)) or sum(map(triage, terms)) > 1
 
 
 def hollow(problem: Problem, hypothesis: Hypothesis) -> bool:
