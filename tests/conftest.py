@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -17,6 +18,10 @@ BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
 # At import, so that child processes and the collection of tests see it too; tests that need the records skip elsewhere.
 if BESIDE.is_dir():
     os.environ.setdefault("UNMODELLED_DATA", str(BESIDE))
+
+# A run in the background of a script ignores interrupts, and so would the commands that the tests start and interrupt.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 OSCILLATOR = Model(
     name="oscillator",

@@ -175,10 +175,12 @@ def test_a_killed_run_resumes_where_it_was(bench: Bench) -> None:
 
 
 def test_a_changed_plug_in_runs_again(bench: Bench) -> None:
-    """Editing an estimator's file makes its cells, and nothing else, run again."""
+    """Editing an estimator's code makes its cells run again; a comment changes no number."""
     words = ("run", "--plan", bench.plan("x-follows", 2), "--jobs", "1", "--json")
     assert json.loads(bench.run(*words))["run"] == 2
-    (bench.folder / "foreign.py").write_text(FOREIGN + "\n# changed\n")
+    (bench.folder / "foreign.py").write_text(FOREIGN + "\n# a comment\n")
+    assert json.loads(bench.run(*words))["run"] == 0
+    (bench.folder / "foreign.py").write_text(FOREIGN + "\nCHANGED = 1\n")
     assert json.loads(bench.run(*words))["run"] == 2
 
 
