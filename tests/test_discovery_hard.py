@@ -10,6 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from suite import plugins
+from suite.benchmark.conditions import trial
 from suite.discovery import checkup, misfit
 from suite.discovery.fit import fit, prepare
 from suite.discovery.verdict import diagnose
@@ -149,3 +150,23 @@ def test_check_names_what_contradicts_the_file() -> None:
     assert not any("hold" in finding for finding in checkup.check(lag, held).findings)
     other = replace(lag, inputs={"F": Input("F", "previous")})
     assert any('hold = "linear"' in finding for finding in checkup.check(other, held).findings)
+
+
+@pytest.mark.parametrize("name", ["stribeck-joint", "slider-friction"])
+def test_friction_that_turns_within_a_sample_needs_no_second_effect(name: str) -> None:
+    """At 1 % noise one integration step a sample errs by more than the noise, which a further effect would imitate."""
+    here = trial(plugins.cases()[name], "missing", 0.01, 2, plugins.effects())
+    verdict = diagnose(here.model, here.record, here.effects)
+    assert {(named.effect, named.equation) for named in verdict.effects} == here.truth
+    assert verdict.weight > 0.9
+
+
+def test_an_epidemic_has_one_flow_and_not_two_effects() -> None:
+    """Immunity that wanes takes from one store what it gives to another."""
+    here = trial(plugins.cases()["epidemic-waning"], "missing", 0.05, 1, plugins.effects())
+    verdict = diagnose(here.model, here.record, here.effects)
+    assert [(named.effect, named.equation, named.term) for named in verdict.effects] == [
+        ("transfer", "S", "+a*R, which R loses")
+    ]
+    rate = verdict.effects[0].coefficients["a"]
+    assert abs(rate.value - 0.012) < 4 * rate.sd

@@ -211,7 +211,7 @@ def prepare(model: Model, record: Record, terms: tuple[Term, ...] = ()) -> Probl
         x0, free = path[list(cut.starts)].copy(), np.ones_like(free)
         problem = replace(problem, record=record, free_x0=free)
     problem = replace(problem, path=path, weights=pace_of(model, record, path), start=Point(x0, model.values))
-    full = replace(problem, substeps=_substeps(problem), terms=terms)
+    full = replace(problem, substeps=substeps(problem, problem.start), terms=terms)
     p = np.concatenate([model.values, *(start_of(full, term) for term in terms)])
     start = Point(np.hstack([x0, np.zeros((len(x0), sum(len(term.states) for term in terms)))]), p)
     for k in range(len(terms)):
@@ -219,16 +219,18 @@ def prepare(model: Model, record: Record, terms: tuple[Term, ...] = ()) -> Probl
     return replace(full, start=start)
 
 
-def _substeps(problem: Problem) -> int:
-    """Integration steps a sample: doubled while that moves the outputs by more than EXACT of the noise; one where the
-    movement does not shrink in the end as a step's error does (a chaotic plant).
+def substeps(problem: Problem, point: Point, active: tuple[int, ...] = (), moves: float = EXACT) -> int:
+    """Integration steps a sample at a point: from the problem's on doubled while that moves an output by more than
+    `moves` of the noise; the problem's where the movement does not shrink as a step's error does (a chaotic plant).
     """
-    before, moved, last, count = np.inf, np.inf, problem.run(problem.start, 0.0), 1
-    while last.finite and moved > EXACT and count < FINEST:
-        finer = replace(problem, substeps=2 * count).run(problem.start, 0.0)
+    layout = problem.layout(active) if active else None
+    before, moved, last, count = np.inf, np.inf, problem.run(point, 0.0, layout), problem.substeps
+    while last.finite and moved > moves and count < FINEST:
+        finer = replace(problem, substeps=2 * count).run(point, 0.0, layout)
         before, moved = moved, float(np.max(np.abs(finer.Y - last.Y) / problem.R**0.5)) if finer.finite else np.inf
         last, count = finer, 2 * count
-    return 1 if moved > 0.25 * before or not np.isfinite(moved) else max(count // 2, 1)
+    settled = moved <= moves or moved <= 0.25 * before
+    return max(count // 2, problem.substeps) if settled and np.isfinite(moved) else problem.substeps
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from suite.discovery.engine import Problem
-from suite.discovery.fit import LEVELS, RISEN, Hypothesis, Level, homotopy, polish
+from suite.discovery.fit import LEVELS, RISEN, Hypothesis, Level, homotopy, polish, substeps
 from suite.discovery.frame import Point
 from suite.discovery.library import incompatible
 from suite.discovery.noise import spans
@@ -28,6 +28,7 @@ ALARM = 9.0  # Lambda above which the model fails
 LOUD = 25.0  # of the noise's variance: an error from which the model fails whatever a process noise is worth
 SWAPPED = 6  # candidates that are refitted in the place of each member of the best set
 ROUNDS = 3  # times that swapping goes on from the best set that it led to
+TURNING = 0.1  # of the noise: what finer integration may move where an effect turns within a sample
 WORTH = 0.7  # of the error's variance: what a further effect must leave less than, for yet another to be sought
 PAIRS = 4  # pairs that are refitted because they help together, at each of two levels
 
@@ -81,6 +82,12 @@ def search(problem: Problem) -> Search:
     fitted = [refit(problem, base, (s.k,), [s]) for s in scores[:REFITTED] if s.LM > 0]
     fitted = _converged(found, fitted)
     found = replace(found, fitted=tuple(fitted))
+    if fitted:
+        # A force that turns within a sample, as dry friction does, needs finer steps than the model.
+        best = min(fitted, key=found.criterion)
+        finer = substeps(problem, best.exact.point, best.active, TURNING)
+        if finer > problem.substeps and np.isfinite(best.exact.L):
+            return search(replace(problem, substeps=finer))
     if fitted and needs_more(found, min(fitted, key=found.criterion)):
         found = _grow(found)
     return found
