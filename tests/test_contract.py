@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from baselines.ekf import EKF
 from suite import contract, plugins, scaffold
 from suite.contracts import gaussian, optimality, plants
 from suite.contracts.outcome import BrokenContractError
@@ -155,8 +156,8 @@ def test_a_method_that_raises_is_a_failed_line() -> None:
         optimality.estimated(_Wrong(), plants.DECAY, plants.record(plants.DECAY, plants.FASTER))
 
 
-class _Wrong(type(plugins.estimators()["ekf"])):  # type: ignore[misc]
+class _Wrong(EKF):
     """Returns numbers instead of an Estimate."""
 
-    def estimate(self, model: Any, record: Any, **_: Any) -> Any:
+    def estimate(self, model: Any, record: Any, q_scale: float = 1.0) -> Any:
         return np.zeros(3)

@@ -10,7 +10,7 @@ class AlphaBeta(Estimator):
     """Luenberger observer with a constant gain. Luenberger (1964); d is its correction over the step."""
 
     name = "alpha-beta"
-    tuning = {"gain": (0.01, 1.0, "log")}  # noqa: RUF012
+    tuning = {"gain": (0.01, 1.0, "log")}
 
     def estimate(self, model, record, gain=0.3):
         prior = prior_of(record)
