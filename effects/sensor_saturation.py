@@ -5,9 +5,9 @@ from suite.effect import Effect, Inner
 EFFECT = Effect(
     id="sensor_saturation",
     term="+a*(min(y, w) - y)",
-    forms=("+a*(max(y, w) - y)", "+a*(max(-w, min(y, w)) - y)"),
+    forms=("+a*(max(y, w) - y)",),
     roles={"y": "output"},
-    sentence="The sensor clips at one end of its range, or at both, as far from zero.",
+    sentence="The sensor clips at one end of its range.",
     dimension="1",
     pinned=True,
     inner={"w": Inner("range", 0.97, 0.0, 1.0, (1.0, 0.9, 0.7, 0.3, 0.1, 0.03))},

@@ -152,15 +152,3 @@ def test_check_names_a_mistake_with_columns(
     assert any(said in finding for finding in mistaken)
     right = check(case.deficient, record).findings
     assert not any("other sign" in finding or "other's place" in finding for finding in right)
-
-
-@pytest.mark.parametrize("share", [0.9, 0.5])
-def test_a_sensor_that_clips_at_both_ends_is_found(share: float) -> None:
-    """Its range comes out with the verdict."""
-    record, _ = NULL.simulate(0.0, 1)
-    reach = share * float(np.abs(record.y).max())
-    noise = 0.01 * record.y.std() * np.random.default_rng(1).standard_normal(record.y.shape)
-    verdict = diagnose(MODEL, replace(record, y=np.clip(record.y, -reach, reach) + noise), EFFECTS)
-    assert [named.effect for named in verdict.effects] == ["sensor_saturation"]
-    (width,) = verdict.effects[0].coefficients.values()
-    assert abs(width.value - reach) < 4 * width.sd
