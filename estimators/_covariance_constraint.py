@@ -40,17 +40,10 @@ class Constrained(Estimator):
     method: ClassVar[GeneralizedIE | GeneralizedIEDiscrete | MinimumModelError]
 
     def estimate(self, model: Model, record: Record, ratio: float = 1.0, q_scale: float = 1.0) -> Estimate:
-        method = self.method
-
-        def estimate(alpha: float, judge: bool) -> Estimate:
-            if isinstance(method, MinimumModelError):
-                return method.estimate(model, record, alpha=alpha, q_scale=q_scale)
-            return method.estimate(model, record, alpha=alpha, q_scale=q_scale, judge=judge)
-
         low, high = math.log(LEAST), math.log(MOST)
 
         def at(level: float) -> tuple[Estimate, float]:
-            found = estimate(math.exp(level), judge=False)
+            found = self.method.estimate(model, record, alpha=math.exp(level), q_scale=q_scale)
             return found, residual_ratio(model, record, found)
 
         best, reached = at(low)
@@ -63,7 +56,6 @@ class Constrained(Estimator):
                 best, reached, level, low = found, got, middle, middle
             else:
                 high = middle
-        best = estimate(math.exp(level), judge=True)
         final = f"alpha = {math.exp(level):.4g}, residuals {reached:.3g} times R"
         report = {**(best.report or {}), "alpha": math.exp(level)}
         if math.isfinite(reached):

@@ -7,6 +7,7 @@ from typing import Literal, TypedDict
 import numpy as np
 import numpy.typing as npt
 
+from suite import along
 from suite.estimator import Estimate
 from suite.filtering import filtered, held, rates
 from suite.kernels.embedding import continuous_embedding, discrete_embedding, embedding_workspace
@@ -26,13 +27,12 @@ Residual = Literal["before", "after"]
 class Weights(TypedDict, total=False):
     """What overrides the prior's: Q, the weight of J, (n,) or (n, n); R (outputs,); S0 (n, n), the first S.
 
-    Left out: density 1/(q_scale Q), the R of the sensors, P0/2. `judge`: evaluate the conditions of a robust estimate.
+    Left out: density 1/(q_scale Q), the R of the sensors, P0/2.
     """
 
     Q: Array | None
     R: Array | None
     S0: Array | None
-    judge: bool
 
 
 class ContinuousOptions(Weights, total=False):
@@ -76,14 +76,11 @@ def cost(
     the equations that have a finite weight: a definition's dhat is a correction of the state, not a model error. None
     where a diverged estimate makes it overflow.
     """
-    h = np.array([model.output(t, state, u) for t, state, u in zip(record.t, x, record.u, strict=True)])
-    wraps = model.angles > 0
     counted = np.flatnonzero(np.diag(inverse) > 0)
     weight = np.linalg.inv(inverse[np.ix_(counted, counted)])
     length = record.t[-1] - record.t[0]
     with np.errstate(all="ignore"):
-        e = record.y - h
-        e[:, wraps] = np.arctan2(np.sin(e[:, wraps]), np.cos(e[:, wraps]))
+        e = along.residuals(model, record, x)[0]
         data = np.nansum(e**2 / R, axis=1)
         part = alpha * np.einsum("ki,ij,kj->k", d[:, counted], weight, d[:, counted])
         J = float(np.trapezoid(data, record.t) / length), float(np.trapezoid(part, record.t) / length)
@@ -108,7 +105,7 @@ def between_samples(model: Model, record: Record, R: Array) -> Array:
 
 def continuous(
     model: Model, record: Record, alpha: float, q_scale: float = 1.0, Q: Array | None = None, R: Array | None = None,
-    S0: Array | None = None, riccati: Riccati = "transition", judge: bool = True,
+    S0: Array | None = None, riccati: Riccati = "transition",
 ) -> Estimate:  # fmt: skip
     """The continuous filter (47)-(55) over one run; arguments as in `ContinuousOptions`.
 
@@ -139,12 +136,12 @@ def continuous(
         embedding_workspace(n, program.inputs, program.parameters, program.outputs_count), flow_workspace(n),
         X, S, D, info,
     )  # fmt: skip
-    return _estimate(model, record, X, S, D, info, inverse, alpha, Rk, note, np.asarray(start), judge, predicted=True)
+    return _estimate(model, record, X, S, D, info, inverse, alpha, Rk, note, np.asarray(start), predicted=True)
 
 
 def discrete(
     model: Model, record: Record, alpha: float, q_scale: float = 1.0, Q: Array | None = None, R: Array | None = None,
-    S0: Array | None = None, residual: Residual = "before", judge: bool = True,
+    S0: Array | None = None, residual: Residual = "before",
 ) -> Estimate:  # fmt: skip
     """The discrete filter (63)-(74) over one run, dhat as a rate; arguments as in `DiscreteOptions`."""
     prior, program = prior_of(record), model.program
@@ -162,7 +159,7 @@ def discrete(
     )  # fmt: skip
     D = rates(model, record, held(X, _failed(info)), held(jumps, _failed(info)))
     Rk = Rs * np.concatenate([record.dt[:1], record.dt])[:, None]
-    return _estimate(model, record, X, S, D, info, inverse, alpha, Rk, "", np.asarray(start), judge, predicted=False)
+    return _estimate(model, record, X, S, D, info, inverse, alpha, Rk, "", np.asarray(start), predicted=False)
 
 
 def _failed(info: npt.NDArray[np.int64]) -> int | None:
@@ -171,8 +168,8 @@ def _failed(info: npt.NDArray[np.int64]) -> int | None:
 
 def _estimate(
     model: Model, record: Record, X: Array, S: Array, D: Array, info: npt.NDArray[np.int64],
-    inverse: Array, alpha: float, R: Array, note: str, S0: Array, judge: bool,
-    *, predicted: bool,
+    inverse: Array, alpha: float, R: Array, note: str, S0: Array, *,
+    predicted: bool,
 ) -> Estimate:  # fmt: skip
     """`predicted`: S is that of the continuous filter, which a sample has not yet made smaller."""
     failed = _failed(info)
@@ -187,12 +184,13 @@ def _estimate(
         ended = f"{REASONS[int(info[1])]} at t = {record.t[failed]:.4g} s; the last estimate is held from there"
         status, note = "diverged", f"{note}; {ended}" if note else ended
     J = cost(model, record, X, D, inverse, alpha, R)
-    if not judge:
-        return Estimate(x=X, P=2.0 * S, d=D, J=J, status=status, note=note, report=report or None)
-    sampled = R[-1] / record.dt[-1]
-    system = None if failed is not None else _errors(model, record, X, S, inverse, sampled, S0, predicted)
-    report |= conditions(system, info[2] < 0, J, alpha)
-    return Estimate(x=X, P=2.0 * S, d=D, J=J, status=status, note=note, report=report)
+
+    def examine() -> dict[str, float | str]:
+        sampled = R[-1] / record.dt[-1]
+        system = None if failed is not None else _errors(model, record, X, S, inverse, sampled, S0, predicted)
+        return conditions(system, info[2] < 0, J, alpha)
+
+    return Estimate(x=X, P=2.0 * S, d=D, J=J, status=status, note=note, report=report or None, examine=examine)
 
 
 def _errors(

@@ -64,6 +64,8 @@ def add_parser(subparsers: Any) -> None:
     twins = verbs.add_parser("twin", parents=[as_json], help="the long twin experiments with published errors")
     twins.add_argument("-o", "--output", type=Path, metavar="FILE", required=True, help="JSON file to write")
     twins.add_argument("--seeds", type=_count, default=20, metavar="N", help="runs of each method, default 20")
+    cost = verbs.add_parser("cost", parents=[out, as_json], help="run time a step against states and record length")
+    cost.add_argument("--estimators", nargs="+", metavar="NAME", help="these alone, default all")
     one = verbs.add_parser("table1", parents=[out, as_json], help="the sources' Table 1 and what better methods reach")
     one.add_argument("--seeds", type=_count, default=5, metavar="N", help="seeds of the comparison, default 5")
 
@@ -80,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
     verb = {
         "list": _list, "run": _run, "tune": _run, "table": _table, "plot": _plot, "report": _report,
         "recovery": _recovery, "claims": _claims, "measured": _measured, "table1": _table_one,
-        "twin": _twin,
+        "twin": _twin, "cost": _cost,
     }  # fmt: skip
     return verb[args.bench](args)
 
@@ -93,8 +95,9 @@ def _list(args: argparse.Namespace) -> int:
         plans = {name: plan.load(name).sentence for name in plan.shipped()}
         print(table.to_json({"plans": plans, "plan": args.plan, "cells": [cell.label for cell in cells]}))
         return 0
+    width = max(map(len, plan.shipped()))
     for name in plan.shipped():
-        print(f"{name:10s} {plan.load(name).sentence}")
+        print(f"{name:{width}s}  {plan.load(name).sentence}")
     print(f"\n{args.plan}: {len(cells)} cells")
     # A whole plan in a line a case and estimator; what a pattern chose, cell by cell.
     names = [cell.label if args.only else f"{cell.case} {cell.estimator}" for cell in cells]
@@ -246,6 +249,21 @@ def _table_one(args: argparse.Namespace) -> int:
 
     made = table_one_page.write(args.output, args.seeds)
     print(table.to_json(made) if args.json else made["text"])
+    return 0
+
+
+def _cost(args: argparse.Namespace) -> int:
+    from suite import plugins
+    from suite.benchmark import cost, table
+    from suite.errors import InputError
+    from suite.report import cost_figures
+
+    unknown = sorted(set(args.estimators or ()) - set(plugins.estimators()))
+    if unknown:
+        raise InputError(f"--estimators {', '.join(unknown)}: nothing is called that; see `unmodelled list`")
+    rows = cost.measure(args.estimators, lambda text: print(text, file=sys.stderr))
+    paths = [str(path) for path in cost_figures.write(rows, args.output)]
+    print(table.to_json({"rows": rows, "files": paths}) if args.json else "\n".join(paths))
     return 0
 
 

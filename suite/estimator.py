@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import abc
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -24,7 +24,8 @@ class Estimate:
     x (steps, n); P (steps, n, n) its covariance or None; d (steps, n) the model error in rate units, so that the
     plant's rate is f + d, or None; P_d (steps, n, n) its covariance or None; J the cost's two parts (data, model) or
     None; parameters what it says of parameters, by name; status "ok", or in a word what went wrong, and the note in
-    a sentence; report: numbers of its own that belong in its row (a threshold, an interval), by name.
+    a sentence; report: numbers of its own that belong in its row (a threshold, an interval), by name; examine: gives
+    more of them, where they take longer to find than the estimate; whoever judges calls it when the clock has stopped.
     """
 
     x: Array
@@ -36,6 +37,7 @@ class Estimate:
     status: str = "ok"
     note: str = ""
     report: Mapping[str, float | str] | None = None
+    examine: Callable[[], Mapping[str, float | str]] | None = field(default=None, compare=False)
 
 
 class Estimator(abc.ABC):

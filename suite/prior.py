@@ -15,8 +15,9 @@ Array = npt.NDArray[np.float64]
 def default_prior(model: Model, record: Record, noise: Array) -> Prior:
     """What may be known before the first sample; `noise` (outputs,) is the standard deviation of the sensors.
 
-    x0: the known initial values, else what the first sample says of a state measured directly, else zero, with
-    P0 = 0, R, or the variance of what is measured. R: the noise as given (never below 1e-6 of the output's spread).
+    x0: the known initial values with P0 = 0, else what the first sample says of a state measured directly, else zero,
+    both with the variance of what is measured: the first sample is an estimator's to use, and must not count twice.
+    R: the noise as given (never below 1e-6 of the output's spread).
     Q: (spread of the measured outputs' rate)^2 times the sampling step, for equations that may be wrong.
     """
     first = record.runs[0]
@@ -31,7 +32,7 @@ def default_prior(model: Model, record: Record, noise: Array) -> Prior:
         if given is not None and not given.estimate:
             x0[i] = given.value
         elif direct and seen[0, direct[0]]:
-            x0[i], P0[i] = first.y[0, direct[0]], R[direct[0]]
+            x0[i], P0[i] = first.y[0, direct[0]], max(spread[direct[0]] ** 2, R[direct[0]])
         else:
             x0[i] = given.value if given is not None else 0.0
             P0[i] = float(np.max(spread**2))

@@ -51,9 +51,9 @@ def test_the_bound_is_the_error_of_the_best_linear_estimate(kind: str) -> None:
     wanted = np.sqrt(np.einsum("kii->ki", P).mean(axis=0))
     found = row(f"posterior-crb{kind}", CASE, 0.1, 0)
     np.testing.assert_allclose(list(found["state_rmse"].values()), wanted, rtol=1e-5)
-    # There is no noise of a seed in it.
+    # There is no noise of a seed in it, but for the width of the prior, which is that of what was measured.
     other = row(f"posterior-crb{kind}", CASE, 0.1, 1)
-    assert other["state_nrmse"] == pytest.approx(found["state_nrmse"], rel=1e-9)
+    assert other["state_nrmse"] == pytest.approx(found["state_nrmse"], rel=1e-6)
 
 
 def test_the_oracle_meets_the_bound_and_no_estimator_beats_it() -> None:

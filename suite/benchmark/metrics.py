@@ -34,15 +34,15 @@ def judge(
     case: Case, record: Record, truth: Truth | None, estimate: Estimate, kind: Literal["filter", "smoother"]
 ) -> dict[str, Any]:
     """The numbers of a row; those that do not apply are left out."""
-    row: dict[str, Any] = {}
+    row: dict[str, Any] = {"report": {**(estimate.report or {}), **(estimate.examine() if estimate.examine else {})}}
     if estimate.status != "ok":
         row |= {"status": "diverged", "reason": f"{estimate.status}: {estimate.note}".rstrip(": ")}
     if not np.all(np.isfinite(estimate.x)):
         first = int(np.argmax(~np.isfinite(estimate.x).all(axis=1)))
         said = row.get("reason") or f"the state is not finite from t = {record.t[first]:g} on"
-        return {**row, "status": "diverged", "reason": said, "report": dict(estimate.report or {})}
+        return {**row, "status": "diverged", "reason": said}
     model = case.deficient
-    row |= {"output_rmse": _output_rmse(model, record, estimate), "report": dict(estimate.report or {})}
+    row["output_rmse"] = _output_rmse(model, record, estimate)
     if estimate.J is not None:
         row |= {"J": sum(estimate.J), "J_data": estimate.J[0], "J_model": estimate.J[1]}
     if kind == "filter" and estimate.P is not None:
