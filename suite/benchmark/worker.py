@@ -6,21 +6,17 @@ Time and memory are watched from outside, so that they hold in compiled code tha
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import importlib
 import multiprocessing
 import os
-import signal
-import sys
-import threading
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass
-from multiprocessing.connection import Connection, wait
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 from suite import plugins
+from suite.processes import die_with_parent, interrupts_held
 
 # A process has this long to start, in seconds: it imports the numerics and may compile the kernels.
 START = 300.0
@@ -59,7 +55,7 @@ class Worker:
         context = multiprocessing.get_context("spawn")
         self.pipe, far = context.Pipe()
         self.process = context.Process(target=_serve, args=(far,), daemon=True)
-        with _interrupts_held():
+        with interrupts_held():
             self.process.start()
         far.close()
         self.task: Task | None = None
@@ -125,22 +121,9 @@ class Worker:
         self.pipe.close()
 
 
-@contextlib.contextmanager
-def _interrupts_held() -> Iterator[None]:
-    """An interrupt at the keyboard is the parent's to handle: a process inherits the mask of its start, for good."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
 def _serve(pipe: Connection) -> None:
     """The life of a worker: import, say so, then answer tasks until the pipe closes."""
-    _die_with_parent()
+    die_with_parent()
     # What an estimator prints must not mix with the results on standard output.
     with contextlib.suppress(OSError):
         os.dup2(2, 1)
@@ -161,18 +144,3 @@ def _serve(pipe: Connection) -> None:
                 pipe.send(result)
             except (TypeError, AttributeError, ValueError) as error:
                 pipe.send(Failure("error", f"its result cannot be sent: {type(error).__name__}: {error}"))
-
-
-def _die_with_parent() -> None:
-    """A worker whose parent was killed must not go on computing, not even in code that never returns to Python."""
-    if sys.platform == "linux":
-        death_signal = 1  # PR_SET_PDEATHSIG
-        ctypes.CDLL(None).prctl(death_signal, signal.SIGKILL)
-    threading.Thread(target=_wait_for_parent, daemon=True).start()
-
-
-def _wait_for_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        wait([parent.sentinel])
-        os._exit(1)
