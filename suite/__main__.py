@@ -81,6 +81,12 @@ def parser() -> argparse.ArgumentParser:
     verb.add_argument("--exact", action="store_true", help="the parameters are exact, whatever the model file says")
     verb.add_argument("--strict", action="store_true", help="exit with 1 if there was an alarm")
     bench_verbs.add_parser(verbs)
+    verb = verbs.add_parser("serve", parents=[as_json], help="the workbench page on 127.0.0.1")
+    verb.add_argument("model", type=Path, nargs="?", metavar="MODEL", help="model file (TOML) to open")
+    verb.add_argument("data", type=Path, nargs="*", metavar="DATA", help="CSV, parquet or MAT files of its runs")
+    verb.add_argument("--port", type=int, metavar="N", help="default the first free one from 8420; 0: any")
+    verb.add_argument("--store", type=Path, metavar="FILE", help="results of `bench run`, to look at in the page")
+    verb.add_argument("--no-browser", action="store_true", help="print the address only")
     verb = verbs.add_parser("new", parents=[as_json], help="a commented plug-in file that passes `unmodelled test`")
     verb.add_argument("kind", choices=("estimator", "case", "effect"), help="what to write")
     verb.add_argument("name", metavar="NAME", help="its name, such as my-filter")
@@ -104,6 +110,10 @@ def main(argv: Sequence[str] | None = None) -> int:
             from suite import watch_verb
 
             return watch_verb.run(args)
+        if args.verb == "serve":
+            from suite.web import verb
+
+            return verb.run(args)
         if args.verb == "list":
             from suite import listing
 
