@@ -41,8 +41,13 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]], numbers: Seque
 
 
 def formula(expression: sympy.Expr) -> str:
-    """An expression as presentation MathML."""
+    """An expression as presentation MathML, without the element `math` around it."""
     return str(mathml(expression, printer="presentation"))
+
+
+def typeset(name: str) -> str:
+    """A name as a formula of its own."""
+    return f"<math>{formula(expressions.symbol(name))}</math>"
 
 
 def model_html(model: Model) -> str:
@@ -60,11 +65,11 @@ def model_html(model: Model) -> str:
     parts = [f"<p><strong>{escaped(model.name)}</strong></p>", table(["equation", ""], rows)]
     if model.parameters:
         numbers = [
-            [formula(expressions.symbol(name)), f"{p.value:.6g}", escaped(p.unit or ""), escaped(known(p))]
+            [typeset(name), f"{p.value:.6g}", escaped(p.unit or ""), escaped(known(p))]
             for name, p in model.parameters.items()
         ]
         parts.append(table(["parameter", "value", "unit", "known"], numbers, (1,)))
-    first = [[formula(expressions.symbol(name)), escaped(_first(model.initial.get(name)))] for name in model.states]
+    first = [[typeset(name), escaped(_first(model.initial.get(name)))] for name in model.states]
     parts.append(table(["state", "at the first sample"], first))
     return "".join(parts)
 
