@@ -42,7 +42,9 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]], numbers: Seque
 
 def formula(expression: sympy.Expr) -> str:
     """An expression as presentation MathML, without the element `math` around it."""
-    return str(mathml(expression, printer="presentation"))
+    text = str(mathml(expression, printer="presentation"))
+    # The letter itself is right in HTML and in XML; a name such as &InvisibleTimes; is in HTML alone.
+    return re.sub(r"&(?!(?:lt|gt|amp|quot);)\w+;", lambda name: html.unescape(name[0]), text)
 
 
 def typeset(name: str) -> str:

