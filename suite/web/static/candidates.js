@@ -4,6 +4,13 @@ import { at, digits, make, percent, plain } from "./dom.js";
 import { current, on, state } from "./store.js";
 import { added, previewed } from "./work.js";
 
+const KINDS = {
+  missing_effect: "An effect is missing, and the data say which.",
+  ambiguous: "An effect is missing; these data do not settle which.",
+  adequate: "Nothing is missing that these data could show.",
+  unexplained: "The model fails, and nothing in the library mends it.",
+};
+
 /** Evidence in words, from a share of the weight. */
 function evidence(weight) {
   if (weight >= 0.9) return "strong evidence";
@@ -60,6 +67,9 @@ function smallest(sizes) {
   );
 }
 
+/** The verdict as the command line says it. */
+const full = (verdict) => make("details", {}, make("summary", {}, "The verdict in full"), make("p", {}, verdict.sentence));
+
 function said() {
   const entry = current();
   if (state.busy && state.busy.entry === entry) return "The analysis is under way; candidates appear here.";
@@ -79,9 +89,9 @@ function draw() {
   const focused = document.activeElement?.getAttribute("aria-label");
   const advice = verdict.advice?.length ? [make("h3", {}, "What would help"), make("ul", { class: "advice" }, ...verdict.advice.map((line) => make("li", {}, line)))] : [];
   at("candidates").replaceChildren(
-    make("p", { class: `verdict ${verdict.verdict}` }, verdict.sentence),
+    make("p", { class: "verdict" }, KINDS[verdict.verdict]),
     make("ol", { class: "list" }, ...list.map(card), list.length ? none(verdict.none) : null),
-    make("div", { class: "further" }, smallest(verdict.smallest_detectable), ...advice),
+    make("div", { class: "further" }, ...advice, smallest(verdict.smallest_detectable), full(verdict)),
   );
   // The list was made anew; whoever stood on one of its buttons stands there still.
   if (focused) [...at("candidates").querySelectorAll("button")].find((button) => button.getAttribute("aria-label") === focused)?.focus();

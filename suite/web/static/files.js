@@ -81,7 +81,7 @@ export function openExample(name) {
     try {
       const { model, data } = await post("api/example", { name });
       replaceUnfinished();
-      await opened(name, model, data, "opened");
+      await opened(`${name}, as given`, model, data, "opened");
     } finally {
       at("example").removeAttribute("aria-busy");
     }

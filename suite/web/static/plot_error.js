@@ -90,13 +90,13 @@ function draw() {
   ];
   if (marked.length) traces.push({ x: marked.map((k) => x[k]), y: marked.map((k) => y[k]), mode: "markers", name: "marked", marker: { color: c.orange, size: 6, line: { color: c.ink, width: 0.6 } } });
   const one = candidate(d);
-  if (one) traces.push({ x: one.curve.x, y: one.curve.y, mode: "lines", name: one.label, line: { color: c.candidate, width: 2.4, dash: "dash" } });
+  if (one) traces.push({ x: one.curve.x, y: one.curve.y, mode: "lines", name: "candidate", line: { color: c.candidate, width: 2.4, dash: "dash" } });
   const shown = overTime() ? entry.step.time.label : withUnit(variable(), d.units[variable()]);
   const share = d.variables.find((each) => each.name === variable())?.ratio;
   const said = Number.isFinite(share) ? `${variable()} orders ${Math.round(100 * share)} percent of it.` : "";
   chart.draw(
     traces,
-    layout(shown, `d in ${withUnit(name, d.units[name])}`, {
+    layout(shown, withUnit(`d in ${name}′`, d.units[`${name}'`]), {
       xaxis: overTime() && zoom ? { range: zoom, autorange: false } : {},
       yaxis: framed(y, sd),
       shapes: [{ type: "line", xref: "paper", x0: 0, x1: 1, y0: 0, y1: 0, line: { color: c.quiet, width: 1 }, layer: "below" }],

@@ -40,7 +40,7 @@ function merged(worst) {
   const joined = [];
   for (const [a, b] of [...worst].sort((one, other) => one[0] - other[0])) {
     const last = joined.at(-1);
-    if (last && a <= last[1] + 0.02 * (b - a)) last[1] = Math.max(last[1], b);
+    if (last && a <= last[1] + 0.3 * (b - a)) last[1] = Math.max(last[1], b);
     else joined.push([a, b]);
   }
   return joined;
@@ -72,12 +72,13 @@ function draw() {
   const xaxis = zoom ? { range: zoom, autorange: false } : {};
   const better = other ? `, with the candidate ${digits(other.fit)} %` : "";
   const sliding = slid ? `, with the sliders ${digits(slid.fit)} %` : "";
-  at("fit").textContent = `fit ${digits(one.fit)} %${better}${sliding}`;
+  const now = other ?? slid;
+  at("fit").textContent = `fit ${digits(one.fit)} %${now ? ` → ${digits(now.fit)} %` : ""}`;
   const noise = Number.isFinite(one.sigma) ? `, noise ${digits(one.sigma)}` : "";
   fit.draw(
     traces,
     layout(time, withUnit(one.name, one.unit), { xaxis, yaxis: range ? { range } : {}, shapes: shades(one.worst) }),
-    `${one.name}: fit ${digits(one.fit)} percent${better}, error ${digits(one.error)}${noise}.`,
+    `${one.name}: fit ${digits(one.fit)} percent${better}${sliding}, error ${digits(one.error)}${noise}.`,
     () => ({
       head: [entry.step.time.label, "measured", "model", ...(other ? ["with the candidate"] : [])],
       rows: one.measured.t.map((t, k) => [t, one.measured.y[k], near(one.model, t), ...(other ? [near(other.model, t)] : [])]),
@@ -108,7 +109,7 @@ function drawRest(one, other, time, xaxis, size, c) {
   const times = one.sigma > 0 ? one.error / one.sigma : NaN;
   const said = Number.isFinite(times) ? `${digits(times, 2)} × the noise` : "noise not known";
   const less = other && one.sigma > 0 ? `, with the candidate ${digits(other.error / one.sigma, 2)} ×` : "";
-  at("residual-said").textContent = said + less;
+  at("residual-said").textContent = less ? `${digits(times, 2)} → ${digits(other.error / one.sigma, 2)} × the noise` : said;
   const worst = merged(one.worst).map(([a, b]) => `${digits(a)} to ${digits(b)}`).join(", ");
   rest.draw(
     traces,

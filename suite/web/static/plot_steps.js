@@ -37,6 +37,7 @@ function draw() {
   const all = [...fitted, ...held].filter(Number.isFinite);
   const top = Math.max(...all, noise > 0 ? noise : 0);
   const logarithmic = noise > 0 && top / noise > 20;
+  const outline = { color: c.ink, width: list.map(({ index }) => (index === state.at && list.length > 1 ? 2 : 0)) };
   const bars = (y, name, colour) => ({
     type: "bar",
     x: at_,
@@ -46,7 +47,7 @@ function draw() {
     textposition: "outside",
     cliponaxis: false,
     textfont: { size: 11.5, color: c.ink },
-    marker: { color: list.map(({ index }) => (later(index) ? faint(colour, 0.35) : colour)) },
+    marker: { color: list.map(({ index }) => (later(index) ? faint(colour, 0.35) : colour)), line: outline },
     hovertemplate: "%{y}<extra></extra>",
   });
   const traces = [bars(fitted, "fitted data", c.blue)];
@@ -55,15 +56,12 @@ function draw() {
   const low = Math.min(noise, ...all);
   const range = logarithmic ? [Math.log10(low / 2), Math.log10(top * 2.5)] : [0, 1.2 * top || 1];
   const words = Math.max(10, Math.floor(58 / Math.max(list.length, 1)));
-  const text = list.map(({ entry, index }) => {
-    const label = wrapped(entry.label.replaceAll("<", "‹"), words);
-    return index === state.at ? `<b>${label}</b>` : label;
-  });
+  const text = list.map(({ entry }) => wrapped(entry.label.replaceAll("<", "‹"), words));
   chart.draw(
     traces,
     layout("", `RMSE of ${withUnit(shown.name, shown.unit)}`, {
       xaxis: { range: [-0.6, Math.max(list.length - 0.4, 1.6)], tickvals: at_, ticktext: text },
-      yaxis: { range, type: logarithmic ? "log" : "linear", ...(logarithmic ? { dtick: 1 } : {}) },
+      yaxis: { range, type: logarithmic ? "log" : "linear", ...(logarithmic ? { dtick: 1, tickformat: "~g" } : {}) },
       more: { bargap: 0.35, barmode: "group" },
     }),
     `${list.map(({ entry, one }) => `${entry.label}: ${digits(one.error)}`).join("; ")}. Noise: ${digits(noise)}.`,

@@ -2,7 +2,7 @@
 
 /**
  * A step: {label, model, data: [DATA], step: STEP|null, analysis: ANALYSIS|null, origin}.
- * origin is "opened", "edited", "refitted" or "added"; an added model comes fitted, and its analysis fills the same step.
+ * `start` is the text that its analysis begins from, where that is not the model. origin is "opened", "edited", "refitted" or "added"; an added model comes fitted, and its analysis fills the same step.
  */
 export const state = {
   history: [],

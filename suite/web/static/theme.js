@@ -40,19 +40,20 @@ export function layout(xTitle, yTitle, extra = {}) {
     automargin: true,
     nticks: 7,
     tickfont: { size: 11, color: c.quiet },
-    exponentformat: "power",
+    exponentformat: "e",
   };
-  const title = (text) => ({ text, font: { size: 12, color: c.quiet }, standoff: 4 });
+  // No markup in text: Plotly would need inline styles for it.
+  const title = (text) => ({ text: text.replaceAll("<", "‹"), font: { size: 12, color: c.quiet }, standoff: 4 });
   return {
     paper_bgcolor: "rgba(0,0,0,0)",
     plot_bgcolor: "rgba(0,0,0,0)",
     font: { family: "system-ui, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif", size: 12, color: c.ink },
-    margin: { l: 46, r: 10, t: 20, b: 32 },
+    margin: { l: 46, r: 10, t: 4, b: 30 },
     dragmode: false,
     hovermode: "closest",
     hoverlabel: { font: { size: 12, color: c.ink }, bgcolor: c.surface, bordercolor: c.quiet },
     showlegend: true,
-    legend: { orientation: "h", x: 0, xanchor: "left", y: 1, yanchor: "bottom", font: { size: 11.5 }, itemclick: false, itemdoubleclick: false },
+    legend: { orientation: "h", x: 0, xanchor: "left", y: 1.01, yanchor: "bottom", font: { size: 11.5 }, tracegroupgap: 0, itemclick: false, itemdoubleclick: false },
     xaxis: { ...axis, title: title(xTitle), showgrid: false, ...extra.xaxis },
     yaxis: { ...axis, title: title(yTitle), nticks: 5, ...extra.yaxis },
     shapes: extra.shapes ?? [],

@@ -36,7 +36,7 @@ export async function analysed() {
   state.busy = { stop, entry, said: "Starting", since: performance.now() };
   tell("busy");
   try {
-    const analysis = await askAnalysis(entry.model, entry.data, stop.signal, ({ progress }) => {
+    const analysis = await askAnalysis(entry.start ?? entry.model, entry.data, stop.signal, ({ progress }) => {
       state.busy.said = progress;
       tell("busy");
     });
@@ -51,7 +51,8 @@ export async function analysed() {
 }
 
 function finished(entry, analysis) {
-  const facts = { analysis, step: analysis.step, model: analysis.model };
+  // Another analysis begins again where this one began, so that nothing is learned twice from the same data.
+  const facts = { analysis, step: analysis.step, model: analysis.model, start: entry.start ?? entry.model };
   if (!state.history.includes(entry)) return;
   if (entry.origin === "added" || entry.origin === "refitted") {
     const seen = current() === entry;
@@ -94,7 +95,7 @@ export async function added(index) {
   const { analysis, data } = current();
   const candidate = analysis.verdict.candidates[index];
   cancel();
-  const entry = push({ label: `+ ${candidate.label}`, model: candidate.model, data, origin: "added", step: candidate.seen ?? null });
+  const entry = push({ label: `+ ${candidate.label}`, model: candidate.model, start: candidate.start, data, origin: "added", step: candidate.seen ?? null });
   await compared(entry);
   while (state.busy) await new Promise((resolve) => requestAnimationFrame(resolve));
   if (current() === entry) await analysed();
