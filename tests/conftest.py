@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -63,3 +66,41 @@ def record_of(model: Model, samples: int = 41, dt: float = 0.05, gaps: bool = Tr
 def plants() -> SimpleNamespace:
     """An oscillator and a driven pendulum, a prior for both, and `record` of either."""
     return SimpleNamespace(OSCILLATOR=OSCILLATOR, PENDULUM=PENDULUM, PRIOR=PRIOR, record=record_of)
+
+
+class Served:
+    """A running `unmodelled serve`: its process, the address it printed, its parts, and the folder of its files."""
+
+    def __init__(self, folder: Path, *arguments: str) -> None:
+        self.folder = folder
+        command = [sys.executable, "-m", "suite", "serve", "--no-browser", "--port", "0", *arguments]
+        self.process = subprocess.Popen(
+            command,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "TMPDIR": str(folder)},
+        )
+        assert self.process.stdout is not None
+        self.url = self.process.stdout.readline().strip()
+        self.origin, _, self.token = self.url.partition("/?token=")
+
+    def end(self) -> None:
+        """Stop it, however it is."""
+        if self.process.poll() is None:
+            self.process.terminate()
+        self.process.communicate(timeout=30)
+
+
+@pytest.fixture(scope="module")
+def serve(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Served]]:
+    """Start servers of the page, which end with the tests of the file."""
+    started: list[Served] = []
+
+    def start(*arguments: str) -> Served:
+        started.append(Served(tmp_path_factory.mktemp("served"), *arguments))
+        return started[-1]
+
+    yield start
+    for served in started:
+        served.end()

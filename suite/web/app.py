@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
-from starlette.middleware import Middleware
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
 
@@ -19,7 +17,7 @@ from suite.web.routes import ROUTES
 from suite.web.static_files import MOUNT
 
 
-def application(desk: Desk) -> Starlette:
+def application(desk: Desk) -> Guard:
     """The app of one server."""
 
     @asynccontextmanager
@@ -32,14 +30,14 @@ def application(desk: Desk) -> Starlette:
 
     app = Starlette(
         routes=[*ROUTES, MOUNT],
-        middleware=[Middleware(Guard, port=desk.port, cookie=desk.cookie, secret=desk.secret)],
         exception_handlers={
             RefusedError: _refused, HTTPException: _http, ClientDisconnect: _left, Exception: _failed,
         },
         lifespan=lifespan,
     )  # fmt: skip
     app.state.desk = desk
-    return app
+    # Outermost, so that an answer to a defect of ours has the headers too.
+    return Guard(app, desk.port, desk.cookie, desk.secret)
 
 
 async def _refused(_: Request, error: Exception) -> Response:
@@ -58,5 +56,4 @@ async def _left(_: Request, error: Exception) -> Response:
 
 
 async def _failed(_: Request, error: Exception) -> Response:
-    print(f"unmodelled: a request failed: {type(error).__name__}: {error}", file=sys.stderr)
     return refusal(f"This is a defect of unmodelled: {type(error).__name__}", 500)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import secrets
 from collections import OrderedDict
 from collections.abc import Sequence
@@ -27,7 +28,7 @@ class Desk:
     crew: Crew = field(default_factory=Crew)
     uploads: Uploads = field(default_factory=Uploads)
     analyses: OrderedDict[str, bytes] = field(default_factory=OrderedDict)
-    examples: list[dict[str, str]] | None = None
+    examples: asyncio.Task[str] | None = None
     loaded: dict[str, object] | None = None
 
     @property
@@ -43,12 +44,18 @@ class Desk:
     def open(self) -> None:
         """Start the processes, and take up the files named at the start."""
         self.crew.start()
+        # Loading the cases takes seconds: begun before the page asks for it.
+        self.examples = asyncio.ensure_future(self.crew.call("examples"))
+        # Nobody may ask before the server is stopped; its failure is then no news.
+        self.examples.add_done_callback(lambda task: task.cancelled() or task.exception())
         if self.model is not None:
             data = [self.uploads.given(path).to_json() for path in self.data]
             self.loaded = {"model": self.model.read_text(encoding="utf-8-sig"), "data": data}
 
     def close(self) -> None:
         """End the processes, remove the temporary files."""
+        if self.examples is not None:
+            self.examples.cancel()
         self.crew.close()
         self.uploads.close()
 

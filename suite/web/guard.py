@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hmac
+import sys
 from http.cookies import CookieError, SimpleCookie
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -56,10 +57,11 @@ class Guard:
             await send(message)
 
         refused = self._refused(scope["method"], path, headers)
+        most = DATA_LIMIT if path == UPLOAD else LIMIT
         if refused is not None:
+            await _drained(receive, most)
             await refused(scope, receive, dressed)
             return
-        most = DATA_LIMIT if path == UPLOAD else LIMIT
         taken = 0
 
         async def counted() -> Message:
@@ -67,10 +69,15 @@ class Guard:
             message = await receive()
             taken += len(message.get("body", b""))
             if taken > most:
+                if message.get("more_body", False):
+                    await _drained(receive, most)
                 raise RefusedError(over(most), status=413)
             return message
 
-        await self.app(scope, counted, dressed)
+        try:
+            await self.app(scope, counted, dressed)
+        except Exception as error:  # the answer is sent; the server goes on
+            print(f"unmodelled: {path[:80]} failed: {type(error).__name__}: {error}", file=sys.stderr)
 
     def _refused(self, method: str, path: str, headers: Headers) -> Response | None:
         """The refusal, if there is a reason for one that the head of the request shows."""
@@ -97,6 +104,16 @@ class Guard:
         return morsel is not None and same(morsel.value, self.secret)
 
 
+async def _drained(receive: Receive, most: int) -> None:
+    """Read on and keep nothing: who is still sending when the connection is closed never sees the answer."""
+    left = most
+    while left > 0:
+        message = await receive()
+        left -= len(message.get("body", b""))
+        if not message.get("more_body", False):
+            return
+
+
 def same(given: str, secret: str) -> bool:
     """Equality in a time that tells nothing of where they differ."""
     return hmac.compare_digest(given.encode(errors="replace"), secret.encode())
@@ -112,4 +129,6 @@ def refusal(sentence: str, status: int, line: int | None = None, plain: bool = F
     """An error as the page reads it, or (`plain`) as a person does."""
     if plain:
         return PlainTextResponse(f"unmodelled: {sentence}\n", status)
-    return JSONResponse({"error": sentence, "line": line}, status)
+    # After a body that is too long nobody waits for its end.
+    headers = {"Connection": "close"} if status == 413 else None
+    return JSONResponse({"error": sentence, "line": line}, status, headers)

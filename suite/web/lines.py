@@ -43,7 +43,7 @@ def line_of(text: str, sentence: str) -> int | None:
     place = re.match(rf"{SOURCE}, \[(\[?)(\w+)\]?\](?: (?:number (\d+)|'?([^\s:']+)'?))?(?: (\w+))?", sentence)
     if place is None:
         word = re.match(rf"{SOURCE}(?:, |: )'?(\w+)'?", sentence)
-        return _key(lines, word[1], None) if word else None
+        return (_header(lines, f"[{word[1]}]") or _key(lines, word[1], None)) if word else None
     double, table, number, key, sub = place.groups()
     if double:
         return _effect(lines, table, number, key, sub)
@@ -74,7 +74,9 @@ def _key(lines: list[str], key: str, table: str | None) -> int | None:
 
 
 def _header(lines: list[str], header: str) -> int | None:
-    return next((number for number, line in enumerate(lines, 1) if line.replace(" ", "").startswith(header)), None)
+    """The line of a table's header, `[table]` or `[[table]]`."""
+    plain = [line.replace(" ", "").removeprefix("[") for line in lines]
+    return next((number for number, line in enumerate(plain, 1) if line.startswith(header.removeprefix("["))), None)
 
 
 def _effect(lines: list[str], table: str, number: str | None, key: str | None, sub: str | None) -> int | None:

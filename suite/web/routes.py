@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import secrets
 from collections.abc import Callable
@@ -44,14 +45,15 @@ def _json(text: str) -> Response:
 async def start(request: Request) -> Response:
     """What the page opens with."""
     desk = desk_of(request)
-    if desk.examples is None:
-        desk.examples = json.loads(await desk.crew.call("examples"))["examples"]
+    assert desk.examples is not None
+    # The task is everybody's: who leaves does not end it.
+    examples = json.loads(await asyncio.shield(desk.examples))["examples"]
     return _json(
         json.dumps(
             {
                 "version": __version__,
                 "limit": DATA_LIMIT,
-                "examples": desk.examples,
+                "examples": examples,
                 "loaded": desk.loaded,
                 "bench": desk.store is not None,
             }

@@ -101,6 +101,7 @@ def _units(model: Model) -> dict[str, str]:
     """The units that the model states: of states, inputs and t by name, and of a state's rate by its name and '."""
     units = dict(model.units)
     for name in model.states:
-        if name in model.units and "t" in model.units:
-            units[f"{name}'"] = compact(unit(model.units[name]) / unit(model.units["t"]))
+        own, time = unit(model.units.get(name, "")), unit(model.units.get("t", ""))
+        if own is not None and time is not None:
+            units[f"{name}'"] = compact(own / time)
     return units

@@ -1,0 +1,334 @@
+"""Nobody but the page gets in, no path from outside is opened, and bad input is answered with a sentence."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import http.client
+import json
+import math
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from suite.discovery import misfit
+from suite.model_file import from_toml
+from suite.readers import read_record
+from suite.web.jobs import RefusedError
+from suite.web.uploads import Uploads
+
+pytest.importorskip("starlette", reason="the extra web is not installed")
+pytest.importorskip("uvicorn", reason="the extra web is not installed")
+httpx = pytest.importorskip("httpx", reason="the tests ask with httpx")
+
+DECAY = """name = "decay"
+[states]
+x = "-k*x + u"
+[parameters]
+k = 1.0
+[inputs]
+u = "u"
+[outputs]
+x = { equation = "x", sigma = 0.01 }
+"""
+
+
+@pytest.fixture(scope="module")
+def served(serve: Callable[..., Any]) -> Any:
+    return serve()
+
+
+@pytest.fixture(scope="module")
+def client(served: Any) -> Iterator[Any]:
+    with httpx.Client(base_url=served.origin, headers={"origin": served.origin}, timeout=120) as inside:
+        assert inside.get("/", params={"token": served.token}).status_code == 303
+        yield inside
+
+
+def _files(served: Any) -> list[Path]:
+    """What the server holds on the disk."""
+    return sorted(path for path in served.folder.rglob("*") if path.is_file())
+
+
+def _csv(rows: int = 60) -> str:
+    t = np.arange(rows) * 0.1
+    noise = 0.01 * np.random.default_rng(1).standard_normal(rows)
+    x = np.exp(-1.2 * t) + noise
+    return "t,u,x\n" + "".join(f"{a!r},0.0,{b!r}\n" for a, b in zip(t.tolist(), x.tolist(), strict=True))
+
+
+def _send(client: Any, text: str, name: str = "decay.csv") -> str:
+    answer = client.post("/api/data", params={"name": name}, content=text.encode())
+    assert answer.status_code == 200, answer.text
+    assert answer.json()["name"] == name
+    return str(answer.json()["id"])
+
+
+@pytest.fixture(scope="module")
+def data(client: Any) -> str:
+    return _send(client, _csv())
+
+
+def _sentence(answer: Any, status: int) -> str:
+    """The sentence of a refusal; none shows a traceback or a path of this machine."""
+    assert answer.status_code == status, answer.text
+    said = str(answer.json()["error"])
+    assert said
+    assert "Traceback" not in said
+    assert "/tmp" not in said
+    return said
+
+
+@pytest.mark.parametrize("host", ["evil.example", "evil.example:{port}", "127.0.0.1", "localhost:1", "0.0.0.0:{port}"])
+def test_a_foreign_host_is_refused_everywhere(client: Any, host: str) -> None:
+    """A page whose name is made to point here (DNS rebinding) gets nothing, not even the page's files."""
+    for path in ("/", "/api/start", "/static/index.html"):
+        answer = client.get(path, headers={"host": host.format(port=client.base_url.port)})
+        assert "only" in _sentence(answer, 403)
+
+
+@pytest.mark.parametrize(
+    "origin", ["http://evil.example", "null", "http://127.0.0.1:1", "https://127.0.0.1:{port}", ""]
+)
+def test_a_foreign_origin_is_refused(client: Any, origin: str) -> None:
+    """Another page cannot ask in the user's name, nor can one on another port of this machine."""
+    headers = {"origin": origin.format(port=client.base_url.port)}
+    assert "Origin" in _sentence(client.post("/api/model", json={"model": DECAY}, headers=headers), 403)
+
+
+def test_a_request_without_origin_changes_nothing(served: Any, client: Any) -> None:
+    """A form or a plain program that sends no Origin is refused where something is posted."""
+    with httpx.Client(base_url=served.origin, cookies=dict(client.cookies)) as bare:
+        assert "None" in _sentence(bare.post("/api/model", json={"model": DECAY}), 403)
+
+
+def test_without_the_cookie_nothing_is_answered(served: Any, client: Any) -> None:
+    """Whoever has no token has no page; a wrong one opens nothing; the right one is left out of the address."""
+    wrong = {name: "x" * len(value) for name, value in client.cookies.items()}
+    assert len(wrong) == 1
+    for cookies in ({}, wrong):
+        with httpx.Client(base_url=served.origin, headers={"origin": served.origin}, cookies=cookies) as stranger:
+            for path in ("/api/start", "/static/index.html", "/api/nothing"):
+                assert "cookie" in _sentence(stranger.get(path), 403)
+            assert "cookie" in _sentence(stranger.post("/api/model", json={"model": DECAY}), 403)
+            assert stranger.get("/").status_code == stranger.get("/?token=wrong").status_code == 403
+    opened = httpx.get(served.url)
+    assert (opened.status_code, opened.headers["location"]) == (303, "/")
+    assert {"httponly", "samesite=strict"} <= {part.strip().lower() for part in opened.headers["set-cookie"].split(";")}
+
+
+@pytest.mark.parametrize("path", ["/", "/api/start", "/api/nothing", "/static/index.html", "/static/nothing"])
+def test_every_answer_forbids_the_browser_everything_else(client: Any, path: str) -> None:
+    """Errors too: no script, style, frame or connection but the server's own."""
+    headers = client.get(path).headers
+    policy = dict(part.strip().split(" ", 1) for part in headers["content-security-policy"].split(";"))
+    assert policy["default-src"] == policy["form-action"] == policy["frame-ancestors"] == policy["base-uri"] == "'none'"
+    assert policy["script-src"] == policy["connect-src"] == policy["style-src"] == "'self'"
+    assert headers["x-content-type-options"] == "nosniff"
+    assert headers["referrer-policy"] == "no-referrer"
+    assert headers["cross-origin-resource-policy"] == headers["cross-origin-opener-policy"] == "same-origin"
+    assert ("no-store" in headers["cache-control"]) == (not path.startswith("/static"))
+
+
+@pytest.mark.parametrize("path", ["/static/../desk.py", "/static/%2e%2e/desk.py", "/static/..%2fdesk.py", "//etc/x"])
+def test_static_files_are_those_of_the_page(client: Any, path: str) -> None:
+    """No way leads out of the folder."""
+    # Sent as it stands: a client would tidy the path up.
+    connection = http.client.HTTPConnection(client.base_url.host, client.base_url.port)
+    [(name, value)] = client.cookies.items()
+    connection.request("GET", path, headers={"Cookie": f"{name}={value}"})
+    assert connection.getresponse().status == 404
+    connection.close()
+
+
+def _endless(sent: list[int]) -> Iterator[bytes]:
+    """Bytes for as long as somebody takes them, a hundred times the limit at most; counts the pieces."""
+    for _ in range(1600):
+        sent[0] += 1
+        yield b"1.0,2.0\n" * 8192
+
+
+def test_a_body_over_the_limit_is_refused_as_it_streams(served: Any, client: Any) -> None:
+    """With or without a stated length; the server takes little more than the limit, and keeps nothing of it."""
+    before = _files(served)
+    assert "1 MB" in _sentence(client.post("/api/model", content=b"#" * 1_100_000), 413)
+    assert "1 MB" in _sentence(client.post("/api/model", content=iter([b"#" * 100_000] * 11)), 413)
+    sent = [0]
+    with contextlib.suppress(httpx.TransportError):
+        assert client.post("/api/model", content=_endless(sent)).status_code == 413
+    assert sent[0] < 200
+    assert _files(served) == before
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "../../etc/passwd",
+        "/etc/passwd.csv",
+        "..\\x.csv",
+        "a\0.csv",
+        "x" * 10_000 + ".csv",
+        "",
+        ".csv",
+        "model.toml",
+        "a.csv.exe",
+        "a\n.csv",
+    ],
+)
+def test_a_name_opens_nothing(served: Any, client: Any, name: str) -> None:
+    """A name that is a path, has control characters or is endless is refused, and no file is written anywhere."""
+    before = _files(served)
+    said = _sentence(client.post("/api/data", params={"name": name}, content=b"t,x\n0,1\n1,2\n"), 400)
+    assert len(said) < 300
+    assert _files(served) == before
+
+
+@pytest.mark.parametrize("identity", ["../../etc/passwd", "/etc/passwd", "\0", "x" * 10_000, ""])
+def test_an_id_that_the_server_did_not_give_opens_nothing(client: Any, identity: str) -> None:
+    """Data are named by ids alone."""
+    for path in ("/api/compare", "/api/analyse"):
+        assert "open them again" in _sentence(client.post(path, json={"model": DECAY, "data": [identity]}), 422)
+    assert "analyse again" in _sentence(client.post("/api/report", json={"analyses": [identity]}), 422)
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "word"),
+    [
+        (DECAY.replace("-k*x + u", "-k*x + F"), 3, "'F' is not declared"),
+        (DECAY.replace("-k*x + u", "__import__('os').system('true')"), 3, "[states] x"),
+        (DECAY.replace("k = 1.0", "k = one"), 5, "TOML"),
+        (DECAY.replace("k = 1.0", 'k = "one"'), 5, "expected a number"),
+        (DECAY.replace("[parameters]", "[parametres]"), 4, "parameters"),
+        (DECAY.replace("sigma = 0.01", "sigma = -1.0"), 9, "sigma"),
+        (DECAY.replace("sigma", "sigm"), 9, "sigm"),
+        (DECAY + "[initial]\ny = 1.0\n", 11, "no such state"),
+        (DECAY + "[units]\nx = 'furlongs per'\n", 11, "no unit"),
+        (DECAY + "[[effects]]\nid = 'pull'\nequation = 'x'\nterm = '-a*q'\ncoefficients = ['a']\n", 13, "'q'"),
+        (DECAY + "x = ", 10, "TOML"),
+        ("", None, "empty"),
+        ("\0", None, "not a text"),
+    ],
+)  # fmt: skip
+def test_an_error_in_the_model_names_its_line(client: Any, text: str, line: int | None, word: str) -> None:
+    """The page marks the line; the sentence says what is wrong with it."""
+    answer = client.post("/api/model", json={"model": text})
+    assert word in _sentence(answer, 422)
+    assert answer.json()["line"] == line
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("", "empty"),
+        ("\x00\x01\x02" * 50, "decay.csv"),
+        ("t,u,x\n0,0,1\n0.1,0\n0.2,0,1,4\n", "line"),
+        ("t,u,x\n0,0,1\n0.1,zero,1\n", "zero"),
+        ("t,u,x\n0,0,1\n0.1,0,2\n0.05,0,3\n", "line 4"),
+        ("t,u,y\n0,0,1\n0.1,0,2\n", "no column 'x'"),
+    ],
+)
+def test_a_bad_table_is_refused_by_the_name_it_has(client: Any, text: str, word: str) -> None:
+    """When it comes in, or when the model asks it for its columns."""
+    answer = client.post("/api/data?name=decay.csv", content=text.encode())
+    if answer.status_code == 200:
+        answer = client.post("/api/compare", json={"model": DECAY, "data": [answer.json()["id"]]})
+    said = _sentence(answer, 400 if not text else 422)
+    assert word in said
+    assert "decay.csv" in said
+
+
+@pytest.mark.parametrize(
+    "body", [b"", b"[", b"[]", b"7", b'{"model": 1}', b'{"model": null}', b"[" * 100_000, b'{"model": "a"', b"\xff\xfe"]
+)
+def test_a_body_that_is_no_request_is_refused(client: Any, body: bytes) -> None:
+    """Whatever is posted, the answer is a sentence."""
+    for path in ("/api/model", "/api/compare", "/api/simulate", "/api/values", "/api/analyse", "/api/report"):
+        _sentence(client.post(path, content=body), 400)
+
+
+@pytest.mark.parametrize("value", ["1", None, True, math.nan, math.inf, 10**400])
+def test_a_value_that_is_no_number_is_refused(client: Any, data: str, value: Any) -> None:
+    """Sliders send finite numbers."""
+    body = json.dumps({"model": DECAY, "data": [data], "values": {"k": value}})
+    for path in ("/api/simulate", "/api/values"):
+        assert "finite numbers" in _sentence(client.post(path, content=body.encode()), 400)
+    unknown = client.post("/api/values", json={"model": DECAY, "values": {"c": 1.0}})
+    assert "it has k" in _sentence(unknown, 422)
+
+
+def test_kept_values_are_the_same_model_elsewhere(client: Any) -> None:
+    """Keep changes the start values and nothing that is known about them."""
+    text = DECAY.replace("k = 1.0", "k = { value = 1.0, sd = 0.2, bounds = [0.0, 2.0] }")
+    answer = client.post("/api/values", json={"model": text, "values": {"k": 1.5}})
+    assert from_toml(answer.json()["model"]) == from_toml(text).with_values({"k": 1.5})
+    beyond = client.post("/api/values", json={"model": text, "values": {"k": 2.5}})
+    assert "from 0 to 2" in _sentence(beyond, 422)
+
+
+@pytest.mark.parametrize("initial", ["", "[initial]\nx = 1.0\n", "[initial]\nx = { value = 0.8, estimate = true }\n"])
+def test_the_sliders_show_the_free_run(client: Any, data: str, tmp_path: Path, initial: str) -> None:
+    """A simulation at other values is what `compare` would give for a model that has them."""
+    path = tmp_path / "decay.csv"
+    path.write_text(_csv())
+    model = from_toml(DECAY + initial)
+    for k in (1.0, 1.7, 0.4):
+        body = {"model": DECAY + initial, "data": [data], "values": {"k": k}}
+        [shown] = client.post("/api/simulate", json=body).json()["outputs"]
+        there = model.with_values({"k": k})
+        expected = misfit.compare(there, read_record(path, there))
+        assert shown["y"] == pytest.approx(expected.Y[:, 0], abs=1e-4)
+        assert shown["error"] == pytest.approx(expected.error["x"], rel=1e-3)
+        assert shown["fit"] == pytest.approx(expected.fit["x"], abs=0.1)
+
+
+def test_examples_open(client: Any) -> None:
+    """Every example that the page offers has a model that can be read and data that it can be compared with."""
+    start = client.get("/api/start").json()
+    assert start["loaded"] is None
+    assert start["bench"] is False
+    names = [entry["name"] for entry in start["examples"]]
+    assert "paper" in names
+    assert len(names) >= 5
+    for name in names:
+        opened = client.post("/api/example", json={"name": name}).json()
+        assert opened["sentence"]
+        said = client.post("/api/model", json={"model": opened["model"]}).json()
+        assert said["states"]
+        step = client.post(
+            "/api/compare", json={"model": opened["model"], "data": [entry["id"] for entry in opened["data"]]}
+        )
+        assert [out["name"] for out in step.json()["outputs"]] == [out["name"] for out in said["outputs"]]
+    assert "choose one of" in _sentence(client.post("/api/example", json={"name": "../silverbox"}), 422)
+
+
+def test_without_a_store_there_is_no_benchmark(client: Any) -> None:
+    """The sentence says how to open one."""
+    for path in ("/api/bench", "/api/bench/cell?key=x"):
+        assert "--store" in _sentence(client.get(path), 404)
+
+
+def test_a_data_file_over_the_limit_is_not_kept(tmp_path: Path) -> None:
+    """What was written of it before the limit was reached is removed."""
+
+    async def chunks() -> Any:
+        for _ in range(3):
+            yield b"1,2\n" * 100
+
+    async def break_off() -> Any:
+        yield b"1,2\n"
+        raise RefusedError("more than 3 MB were sent", status=413)
+
+    uploads = Uploads()
+    try:
+        kept = asyncio.run(uploads.take("a.csv", chunks()))
+        assert kept.path.read_bytes() == b"1,2\n" * 300
+        with pytest.raises(RefusedError):
+            asyncio.run(uploads.take("b.csv", break_off()))
+        assert [path.name for path in uploads.folder.iterdir()] == [kept.path.name]
+        assert "a.csv" not in kept.path.name
+    finally:
+        uploads.close()
+    assert not uploads.folder.exists()
