@@ -50,7 +50,7 @@ function build(view) {
 
 function heading(column) {
   const name = column.unit ? `${column.label} (${column.unit})` : column.label;
-  return make("th", { scope: "col", "data-key": column.key }, make("button", { type: "button", onclick: () => sort(column.key) }, name));
+  return make("th", { scope: "col", "data-key": column.key, title: column.meaning }, make("button", { type: "button", onclick: () => sort(column.key) }, name));
 }
 
 function sort(key) {

@@ -3,7 +3,7 @@
 import { get, post, Refused, upload } from "./api.js";
 import { at, make } from "./dom.js";
 import { refused } from "./modeltext.js";
-import { current, push, state, tell } from "./store.js";
+import { current, push, state } from "./store.js";
 import { opened, problem } from "./work.js";
 import { choose } from "./tabs.js";
 
@@ -91,6 +91,7 @@ export function openExample(name) {
 function menu(examples) {
   const list = at("examples-menu");
   const button = at("examples");
+  button.disabled = false;
   const shown = (open) => {
     list.hidden = !open;
     button.setAttribute("aria-expanded", String(open));
@@ -152,11 +153,8 @@ export async function start() {
   at("example").addEventListener("click", () => openExample("mug"));
   at("try").addEventListener("click", () => openExample("mug"));
   await tried(async () => {
-    const { version, examples, loaded, bench } = await get("api/start");
-    state.version = version;
-    at("benchmark").hidden = !bench;
+    const { examples, loaded } = await get("api/start");
     menu(examples);
     if (loaded) await opened("as given", loaded.model, loaded.data, "opened");
   });
-  tell("step");
 }

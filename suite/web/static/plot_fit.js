@@ -73,7 +73,7 @@ function draw() {
   const better = other ? `, with the candidate ${digits(other.fit)} %` : "";
   const sliding = slid ? `, with the sliders ${digits(slid.fit)} %` : "";
   const now = other ?? slid;
-  at("fit").textContent = `fit ${digits(one.fit)} %${now ? ` → ${digits(now.fit)} %` : ""}`;
+  at("fit").textContent = now ? `fit ${digits(one.fit)} → ${digits(now.fit)} %` : `fit ${digits(one.fit)} %`;
   const noise = Number.isFinite(one.sigma) ? `, noise ${digits(one.sigma)}` : "";
   fit.draw(
     traces,

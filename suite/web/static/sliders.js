@@ -57,7 +57,7 @@ function reach(one) {
 
 function row(one) {
   const [low, high] = reach(one);
-  const shown = digits(one.value, 6).replaceAll("−", "-");
+  const shown = digits(one.value, 5).replaceAll("−", "-");
   const label = `${one.name}${one.unit ? ` (${one.unit})` : ""}`;
   const slide = make("input", { type: "range", min: low, max: high, step: "any", value: one.value, "aria-label": `${label}, slider` });
   const field = make("input", { type: "number", step: "any", value: shown, "aria-label": `${label}, value` });

@@ -13,7 +13,6 @@ export const state = {
   preview: null, // {candidate index, step: STEP}
   busy: null, // AbortController of the running analysis
   interval: null, // [t0, t1] marked in all plots
-  version: "",
 };
 
 const listeners = new Map();
