@@ -129,11 +129,12 @@ def _steps(given: float, refitted: float, one: float, after: float) -> Figure:
     for k, value in enumerate(heights):
         ax.annotate(f"{value:.3g} °C", (k, value), (0, 3), textcoords="offset points", ha="center", fontsize=11)
     ax.axhline(0.05, color=INK, linestyle="--", linewidth=1.2)
-    ax.annotate("noise of the probe", (-0.45, 0.05), (0, 3), textcoords="offset points", fontsize=9.5)
+    ax.annotate("noise of\nthe probe", (3.36, 0.05), (0, 3), textcoords="offset points", fontsize=9.5)
     ax.set_yscale("log")
     ax.set_ylim(0.02, 4.0)
     ax.set_yticks([0.03, 0.1, 0.3, 1, 3], ["0.03", "0.1", "0.3", "1", "3"])
     ax.set_xticks(range(4), names)
+    ax.set_xlim(-0.5, 3.95)
     dressed(ax, "", "RMSE in °C, logarithmic")
     ax.minorticks_off()
     ax.grid(False, axis="x")

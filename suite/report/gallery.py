@@ -162,13 +162,14 @@ def _line(ax: Axes, t: Array, y: Array, colour: str, label: str) -> None:
 
 
 def _where(ax: Axes, first: Model, last: Model, record: Record, found: Discrepancy) -> None:
-    """The smoothed model error of the training record against what orders it, and what was added to the rate."""
+    """The smoothed model error of the training record against what orders it, and how the amended rate differs."""
     i = list(first.states).index(found.equation)
     v, d = variable(first, record, found), found.d[:, i]
     kept = thinned(d, MOST)
     dots(ax, v[kept], d[kept], "#C9CED3", "model error d, each sample", 2.6)
     b = bins(found, v, record, i)
     seen = b.count > 0
+    shown = [*np.percentile(d, [0.5, 99.5]).tolist(), *b.mean[seen].tolist()]
     centre, spread = 0.5 * (b.edges[1:] + b.edges[:-1])[seen], BAND95 * b.sd[seen]
     ax.fill_between(centre, b.mean[seen] - spread, b.mean[seen] + spread, color=SKY, alpha=0.4, linewidth=0, zorder=3)
     ax.plot(centre, b.mean[seen], "o-", color=INK, markersize=4, linewidth=1.2, label="d, mean of a bin", zorder=4)
@@ -176,11 +177,17 @@ def _where(ax: Axes, first: Model, last: Model, record: Record, found: Discrepan
         u = record.u
         added = np.array([last.rate(record.t[k], found.x[k], u[k])[i] - first.rate(record.t[k], found.x[k], u[k])[i]
                           for k in kept])  # fmt: skip
+        shown += [float(added.min()), float(added.max())]
         order = np.argsort(v[kept], kind="stable")
         if np.abs(np.diff(added[order])).sum() < 8 * (np.ptp(added) or 1.0):
-            ax.plot(v[kept][order], added[order], color=ORANGE, linewidth=2.2, label="what the effect adds", zorder=5)
+            ax.plot(
+                v[kept][order], added[order], color=ORANGE, linewidth=2.2, label="rate amended − rate given", zorder=5
+            )
         else:
             dots(ax, v[kept], added, ORANGE, "what the effect adds", 2.4)
+    # A single sample at which the smoother jumps is no reason to flatten all others.
+    margin = 0.12 * (max(shown) - min(shown))
+    ax.set_ylim(min(shown) - margin, max(shown) + margin)
     ax.axhline(0, color=INK, linewidth=0.8)
     label = label_of(first, record, found.variable)
     dressed(ax, label, f"missing in {found.equation}'", f"Where: d against {found.variable}")
