@@ -66,10 +66,12 @@ def demands() -> str:
     """The demands on the recovery benchmark with the figures reached, as a Markdown table."""
     with DEMANDS.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
-    cells = [["what", "reached", "95 % interval", "of", "wanted"]]
+    cells = [["what", "figure", "95 % interval", "of", "wanted", "met"]]
     for row in rows:
         figure, low, high = (f"{float(row[key]):.3g}" for key in ("figure", "low", "high"))
-        cells.append([row["what"].strip(), figure, f"{low} to {high}", row["count"], row["target"]])
+        what = row["what"].strip() if row["what"] == row["what"].lstrip() else f"– {row['what'].strip()}"
+        met = "yes" if row["reached"] == "True" else "**no**"
+        cells.append([what, figure, f"{low} to {high}", row["count"], row["target"], met])
     return markdown(cells)
 
 

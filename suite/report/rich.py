@@ -56,9 +56,9 @@ def model_html(model: Model) -> str:
     """A model: its equations typeset, its numbers with how well they are known, its first states."""
     rows = []
     for name, rate in zip(model.states, model.rates, strict=True):
-        dotted = f"<mover>{formula(expressions.symbol(name))}<mo>˙</mo></mover>"
+        primed = f"<msup>{formula(expressions.symbol(name))}<mo>′</mo></msup>"
         note = "a definition" if name in model.definitions else "" if name in model.suspects else "not in doubt"
-        rows.append([_equation(dotted, rate), note])
+        rows.append([_equation(primed, rate), note])
     for name, equation in zip(model.outputs, model.output_expressions, strict=True):
         sigma = model.outputs[name].sigma
         noise = "" if sigma is None else f", noise {sigma:g}"
