@@ -50,7 +50,8 @@ function build(view) {
 
 function heading(column) {
   const name = column.unit ? `${column.label} (${column.unit})` : column.label;
-  return make("th", { scope: "col", "data-key": column.key, title: column.meaning }, make("button", { type: "button", onclick: () => sort(column.key) }, name));
+  const number = table.rows.some((row) => typeof row[column.key] === "number");
+  return make("th", { scope: "col", class: number ? "number" : "", "data-key": column.key, title: column.meaning }, make("button", { type: "button", onclick: () => sort(column.key) }, name));
 }
 
 function sort(key) {
@@ -86,11 +87,10 @@ function scales(rows) {
   const judged = table.columns.filter((column) => column.better === "low" || column.better === "high");
   return new Map(
     judged.map(({ key, better }) => {
-      const values = rows.map((row) => row[key]).filter(Number.isFinite).sort((a, b) => a - b);
+      const values = rows.map((row) => row[key]).filter(Number.isFinite).sort((a, b) => (better === "low" ? a - b : b - a));
       return [key, (value) => {
         if (!Number.isFinite(value) || values.length < 2 || values[0] === values.at(-1)) return null;
-        const share = values.findIndex((one) => one >= value) / (values.length - 1);
-        return better === "low" ? share : 1 - share;
+        return values.indexOf(value) / (values.length - 1);
       }];
     }),
   );
@@ -120,7 +120,7 @@ function line(row, scale) {
     const number = typeof value === "number";
     const shown = number ? digits(value) : String(value ?? "–");
     if (k === 0) return make("th", { scope: "row" }, make("button", { type: "button", class: "open" }, shown));
-    const cell = make("td", { class: number ? "number" : "" }, shown);
+    const cell = make("td", { class: number || shown === "–" ? "number" : "", title: shown.length > 44 ? shown : null }, shown);
     const share = scale.get(key)?.(value) ?? null;
     if (share !== null) cell.style.backgroundColor = shade(share);
     return cell;

@@ -12,7 +12,8 @@ const KINDS = {
 };
 
 /** Evidence in words, from a share of the weight. */
-function evidence(weight) {
+function evidence(share) {
+  const weight = Math.round(100 * share) / 100;
   if (weight >= 0.9) return "strong evidence";
   if (weight >= 0.6) return "good evidence";
   if (weight >= 0.25) return "some evidence";
