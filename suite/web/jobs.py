@@ -32,7 +32,7 @@ class Hand:
     """One process and the pipe to it."""
 
     def __init__(self) -> None:
-        context = multiprocessing.get_context("spawn")
+        context = _context()
         self.pipe, far = context.Pipe()
         self.process = context.Process(target=worker.serve, args=(far,), daemon=True)
         with interrupts_held():
@@ -44,6 +44,18 @@ class Hand:
         """Kill the process; whoever still reads from it finds the end of the pipe."""
         self.process.kill()
         self.process.join()
+
+
+def _context() -> Any:
+    """Where the system can fork, from a process that has everything loaded already: a new one then takes no time.
+
+    That process has one thread, unlike this one, so that a fork of it is sound.
+    """
+    if "forkserver" not in multiprocessing.get_all_start_methods():
+        return multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload([worker.MORTAL, worker.WARM])
+    return context
 
 
 class Crew:

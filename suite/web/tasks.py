@@ -11,7 +11,6 @@ from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
-from suite import plugins
 from suite.discovery import misfit
 from suite.discovery.discrepancy import discrepancy
 from suite.discovery.fit import prepare
@@ -36,11 +35,6 @@ CHEAP = 3000  # samples up to which a comparison also smooths the model error
 examples, example = example_tasks.examples, example_tasks.example
 analyse, report = discovery_tasks.analyse, discovery_tasks.report
 bench, cell = bench_tasks.bench, bench_tasks.cell
-
-
-def warm() -> None:
-    """Load what every task needs."""
-    plugins.effects()
 
 
 def model(source: str, tell: Tell) -> str:

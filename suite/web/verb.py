@@ -6,6 +6,7 @@ import argparse
 import errno
 import json
 import os
+import signal
 import socket
 import sys
 import threading
@@ -30,6 +31,8 @@ def run(args: argparse.Namespace) -> int:
     except ImportError as error:
         raise InputError(f"the page needs {error.name}; install it with: pip install 'unmodelled[web]'") from None
     listener = _bound(args.port)
+    # Ended in order: what is removed at exit is removed then too.
+    signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
     try:
         _serve(args, listener)
     except KeyboardInterrupt:

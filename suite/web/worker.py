@@ -13,7 +13,7 @@ from typing import Any
 from suite.errors import InputError
 from suite.processes import die_with_parent
 
-TASKS = "suite.web.tasks"
+MORTAL, WARM = "suite.web.mortal", "suite.web.warm"
 
 # What a process says: that it has started, what it is at, the answer, that the input is bad, that it failed itself.
 READY, TOLD, DONE, REFUSED, FAILED = "ready", "told", "done", "refused", "failed"
@@ -30,8 +30,7 @@ def serve(pipe: Connection) -> None:
         os.dup2(2, 1)
     warnings.simplefilter("ignore")
     with contextlib.suppress(KeyboardInterrupt, EOFError, BrokenPipeError, ConnectionResetError):
-        tasks = importlib.import_module(TASKS)
-        tasks.warm()
+        tasks = importlib.import_module(WARM).tasks
         pipe.send((READY, None))
         while True:
             name, arguments = pipe.recv()
