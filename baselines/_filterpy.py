@@ -17,6 +17,8 @@ from filterpy.kalman import ExtendedKalmanFilter, MerweScaledSigmaPoints, Unscen
 from suite.disturbance import spread_out, with_random_walk
 from suite.estimator import Estimate
 from suite.filtering import rates
+from suite.kernels.integrate import advance, workspace
+from suite.kernels.types import arrays
 from suite.model import Model
 from suite.prior import prior_of
 from suite.record import Prior, Record
@@ -63,33 +65,54 @@ Seen = npt.NDArray[np.bool_]
 Residual = Callable[[Array, Array], Array]
 
 
-@dataclass(frozen=True)
 class Plant:
-    """A model along a record: what a filter needs of it at sample k, where step k ends."""
+    """A model along a record: what a filter needs of it at sample k, where step k ends.
 
-    model: Model
-    record: Record
+    A filter asks some ten times a sample, so everything that does not change is made once.
+    """
+
+    def __init__(self, model: Model, record: Record) -> None:
+        self.model, self.record = model, record
+        program = model.program
+        self._t, self._u = record.t.tolist(), list(record.u)
+        self._rate, self._output = program.rate, program.output
+        self._values, self._linear = arrays(model.values, model.linear_inputs)
+        self._off, self._none = program.all_off(), np.zeros(0, dtype=np.int64)
+        self._work = workspace(program.n, program.inputs, program.parameters, 0)
+        self._by_p = np.zeros((program.outputs_count, program.parameters))
 
     def dt(self, k: int) -> float:
         """The length of step k."""
-        return float(self.record.t[k] - self.record.t[k - 1])
+        return float(self._t[k] - self._t[k - 1])
 
     def transition(self, k: int, x: Array) -> tuple[Array, Array]:
         """The state at sample k from x (n,) at k - 1, and its derivative by x, (n, n)."""
-        t, u = self.record.t, self.record.u
-        return self.model.transition(float(t[k - 1]), x, tuple(u[k - 1]), self.dt(k), tuple(u[k]))
+        after = np.array(x, dtype=np.float64)
+        T = np.empty((len(after), len(after)))
+        advance(
+            self._rate, self._t[k - 1], self._t[k] - self._t[k - 1], self._u[k - 1], self._u[k], self._linear,
+            self._values, self._off, self._none, 1, after, T, self._work,
+        )  # fmt: skip
+        return after, T
 
     def step(self, k: int, x: Array) -> Array:
         """The state at sample k from x (n,) at k - 1."""
         return self.transition(k, x)[0]
 
+    def outputs(self, k: int, x: Array) -> tuple[Array, Array]:
+        """The outputs at sample k, (outputs,), and their derivative by x, (outputs, n)."""
+        h, H = np.zeros(len(self._by_p)), np.zeros((len(self._by_p), len(x)))
+        point = np.ascontiguousarray(x, dtype=np.float64)
+        self._output(self._t[k], point, self._u[k], self._values, self._off, h, H, self._by_p)
+        return h, H
+
     def output(self, k: int, x: Array) -> Array:
         """The outputs at sample k, (outputs,)."""
-        return self.model.output(float(self.record.t[k]), x, tuple(self.record.u[k]))
+        return self.outputs(k, x)[0]
 
     def output_jacobian(self, k: int, x: Array) -> Array:
         """Their derivative by x, (outputs, n)."""
-        return self.model.output_jacobian(float(self.record.t[k]), x, tuple(self.record.u[k]))
+        return self.outputs(k, x)[1]
 
 
 class SteppedEKF(ExtendedKalmanFilter):
@@ -120,13 +143,8 @@ def extended(model: Model, record: Record, prior: Prior, inflation: float = 1.0)
             ekf.P = inflation ** plant.dt(k) * ekf.P
 
     def update(k: int, seen: Seen, residual: Residual) -> float:
-        ekf.update(
-            record.y[k, seen],
-            lambda x: plant.output_jacobian(k, x)[seen],
-            lambda x: plant.output(k, x)[seen],
-            R=np.diag(prior.R[seen]),
-            residual=residual,
-        )
+        h, H = plant.outputs(k, ekf.x)
+        ekf.update(record.y[k, seen], lambda _: H[seen], lambda _: h[seen], R=np.diag(prior.R[seen]), residual=residual)
         return float(ekf.y @ ekf.SI @ ekf.y)
 
     return drive(ekf, model, record, predict, update)
@@ -241,6 +259,8 @@ def smoothed_pass(run: Pass, plant: Plant, smooth: Callable[[int], tuple[Array, 
 
 def _residual(angle: Seen) -> Residual:
     """Z - h, on [-pi, pi] where it is an angle's."""
+    if not angle.any():
+        return np.subtract
 
     def residual(z: Array, h: Array) -> Array:
         e = np.subtract(z, h)

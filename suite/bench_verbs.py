@@ -116,6 +116,7 @@ def _run(args: argparse.Namespace) -> int:
     how = matrix.Running(
         jobs=args.jobs, limit=chosen.limit, memory=args.memory or chosen.memory, data=args.data, force=args.force,
         dask=args.dask, tuned_at=chosen.tuned_at,
+        tuned_as=chosen.tuned_as,
     )  # fmt: skip
     with Store(args.store) as store:
         done = matrix.run(cells, store, how, tune_only=args.bench == "tune")

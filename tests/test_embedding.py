@@ -164,6 +164,28 @@ def test_the_jump_that_a_constant_disturbance_makes_becomes_that_disturbance() -
     assert np.max(np.abs(jumps[1:] / 0.05 - d)) > 1e-3
 
 
+@pytest.mark.parametrize("pace", [0.1, 1.0, 4.0, 60.0])
+def test_a_jump_is_made_a_rate_by_the_integral_of_the_exponential(pace: float) -> None:
+    """G d = jump to 1e-9 of what scipy's exponential gives, for a turning plant slow or fast against its sampling.
+
+    Above 2 pi (pace 60: an angle of 12 a sample) the series does not converge and the exponential itself is used.
+    """
+    dt = 0.2
+    model = Model(
+        "turning", {"a": f"{pace}*b - 0.3*a", "b": f"-{pace}*a + c", "c": "-c"}, outputs={"a": Output("a", "a")}
+    )
+    N = 6
+    record = Record(np.arange(N) * dt, np.zeros((N, 0)), np.zeros((N, 1)))
+    jumps = np.random.default_rng(1).standard_normal((N, 3))
+    F = model.jacobian(0.0, np.zeros(3))
+    both = np.zeros((6, 6))
+    both[:3, :3], both[:3, 3:] = F * dt, np.eye(3) * dt
+    wanted = np.linalg.solve(expm(both)[:3, 3:], jumps[1:].T).T
+    found = rates(model, record, np.zeros((N, 3)), jumps)
+    np.testing.assert_allclose(found[1:], wanted, rtol=1e-9, atol=1e-9 * np.abs(wanted).max())
+    assert not found[0].any()
+
+
 def test_the_residual_after_the_update_fades_with_the_weight() -> None:
     """As alpha Q -> 0 dhat of (95) as printed goes to 0, and dhat of the residual before the update does not."""
     record = experiment(LINEAR)

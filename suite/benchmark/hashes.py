@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import version
 from importlib.util import find_spec
@@ -80,20 +81,27 @@ def _array(values: Any) -> str:
 class Keys:
     """The key of every cell and every tuning, each hash computed once."""
 
-    def __init__(self, data: Path | None, tuned_at: float | None = None) -> None:
+    def __init__(
+        self, data: Path | None, tuned_at: float | None = None, tuned_as: Mapping[str, str] | None = None
+    ) -> None:
         self.tuned_at = tuned_at
+        self.tuned_as = tuned_as or {}
         self.plugin = cache(lambda name: method(name) if name in METHODS else plugin(references.methods()[name]))
         self.case = cache(lambda name: case(plugins.cases()[name], data))
         self.measures = cache(measures)
 
     def tuning(self, name: str, noise: float, estimator: str) -> str:
         """The key of the tuned values of an estimator on a case for a noise level."""
-        noise = self.tuning_noise(noise)
+        noise, estimator = self.tuning_noise(noise), self.tuner(estimator)
         return _digest("tuning", name, noise, estimator, self.plugin(estimator), self.case(name), suite.__version__)
 
     def tuning_noise(self, noise: float) -> float:
         """The noise level at which the values for a level are found."""
         return noise if self.tuned_at is None else self.tuned_at
+
+    def tuner(self, estimator: str) -> str:
+        """The estimator whose tuned values serve one."""
+        return self.tuned_as.get(estimator, estimator)
 
     def cell(self, cell: Cell) -> str:
         """The key of a cell."""

@@ -8,7 +8,7 @@ import os
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -68,7 +68,7 @@ def _runs(data: Path | None) -> dict[str, int]:
 @dataclass(frozen=True)
 class Running:
     """How cells are run: `jobs` processes here or the Dask cluster at an address; `limit` in seconds and `memory` in
-    MiB are of one cell; `force` runs again what is stored; `tuned_at` as in a plan.
+    MiB are of one cell; `force` runs again what is stored; `tuned_at` and `tuned_as` as in a plan.
     """
 
     jobs: int | None = None
@@ -79,6 +79,7 @@ class Running:
     quiet: bool = False
     dask: str | None = None
     tuned_at: float | None = None
+    tuned_as: Mapping[str, str] = field(default_factory=dict)
 
     def results(self, tasks: Iterator[Task | None], limit: float) -> Iterator[tuple[Task, Any]]:
         """Each task with its result or Failure, as they finish."""
@@ -89,7 +90,7 @@ class Running:
 
 def run(cells: Sequence[Cell], store: Store, how: Running, *, tune_only: bool = False) -> dict[str, Any]:
     """Run what is not in the store yet (or all, with `force`); counts by status, and how many were still good."""
-    keys, since = Keys(how.data, how.tuned_at), time.time() if how.force else 0.0
+    keys, since = Keys(how.data, how.tuned_at, how.tuned_as), time.time() if how.force else 0.0
     stored = {} if how.force else store.keys()
     fresh = [cell for cell in cells if tune_only or stored.get(cell) != keys.cell(cell)]
     with Reservations(store) as held:
@@ -119,6 +120,8 @@ def run(cells: Sequence[Cell], store: Store, how: Running, *, tune_only: bool = 
                     row = {"status": outcome.status, "reason": outcome.reason}
                     kind = "recovery" if recovers(cell) else cell.variant
                     row |= {"kind": kind} if kind in ("recovery", VARIANT) else {}
+                if cell.variant == "tuned" and keys.tuner(cell.estimator) != cell.estimator:
+                    row["tuned_as"] = keys.tuner(cell.estimator)
                 hashes = {"plugin_hash": keys.plugin(cell.estimator), "case_hash": keys.case(cell.case)}
                 with store.transaction():
                     store.put(cell, keys.cell(cell), {**row, **hashes, "versions": versions})
@@ -131,7 +134,9 @@ def run(cells: Sequence[Cell], store: Store, how: Running, *, tune_only: bool = 
 
 def _tune(cells: Sequence[Cell], store: Store, keys: Keys, how: Running, held: Reservations, since: float) -> int:
     """Find the tuned values that are not stored; where tuning failed they are {}, the defaults. How many are wanted."""
-    wanted = dict.fromkeys((c.case, keys.tuning_noise(c.noise), c.estimator) for c in cells if c.variant == "tuned")
+    wanted = dict.fromkeys(
+        (c.case, keys.tuning_noise(c.noise), keys.tuner(c.estimator)) for c in cells if c.variant == "tuned"
+    )
     by_key = {keys.tuning(*entry): entry for entry in wanted}
     fresh = {key: entry for key, entry in by_key.items() if store.tuning(key, since) is None}
 

@@ -81,6 +81,13 @@ class Plan:
                         cells += [Cell(case.name, noise, name, variant, seed) for seed in range(count)]
         return cells
 
+    @property
+    def tuned_as(self) -> dict[str, str]:
+        """Whose tuned values serve a method, where the rules say that they are not its own."""
+        if self.kind == "recovery":
+            return {}
+        return limits.tuners(self.rules, {name: e.tuning for name, e in plugins.estimators().items()})
+
     def chosen_cases(self) -> list[Case]:
         """The cases of the plan."""
         cases = plugins.cases()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import fnmatch
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +14,9 @@ from suite.errors import InputError
 class Rule:
     """A limit on methods by pattern: judged seeds at most, states of the model at most, variants; None: no limit.
 
-    `because` is the reason, which stands in the plan file beside the limit.
+    `tuned_as` names the estimator whose tuned values serve these too, in place of a tuning of their own (the process
+    noise of an EKF serves every filter with that noise). `because` is the reason, which stands in the plan file beside
+    the limit.
     """
 
     estimators: tuple[str, ...]
@@ -22,6 +24,7 @@ class Rule:
     seeds: int | None = None
     most_states: int | None = None
     variants: tuple[str, ...] | None = None
+    tuned_as: str | None = None
 
     def holds(self, estimator: str) -> bool:
         """Whether it is about a method."""
@@ -40,13 +43,25 @@ def allowed(rules: Sequence[Rule], estimator: str, variant: str, states: int, se
     return seeds
 
 
+def tuners(rules: Sequence[Rule], tuning: Mapping[str, Collection[str]]) -> dict[str, str]:
+    """Whose tuned values serve a method, by method, where they are not its own; `tuning`: each method's numbers."""
+    found: dict[str, str] = {}
+    for rule in (rule for rule in rules if rule.tuned_as is not None):
+        served = [name for name in tuning if rule.holds(name) and name != rule.tuned_as]
+        unlike = [name for name in served if set(tuning[name]) != set(tuning.get(str(rule.tuned_as), ()))]
+        if unlike:
+            raise InputError(f"tuned_as = {rule.tuned_as!r}: it does not tune the same numbers as {', '.join(unlike)}")
+        found |= dict.fromkeys(served, str(rule.tuned_as))
+    return found
+
+
 def parse(tables: Sequence[Any], variants: Sequence[str], source: str) -> tuple[Rule, ...]:
     """The rules of a plan's [[rules]] tables; InputError says which entry is wrong."""
     return tuple(_rule(table, variants, f"{source}: rule {place}") for place, table in enumerate(tables, 1))
 
 
 def _rule(table: Any, variants: Sequence[str], where: str) -> Rule:
-    known = ("estimators", "because", "seeds", "most_states", "variants")
+    known = ("estimators", "because", "seeds", "most_states", "variants", "tuned_as")
     if not isinstance(table, dict) or not set(table) <= set(known):
         raise InputError(f"{where}: {table!r}; expected a table of {', '.join(known)}")
     for key in ("estimators", "variants"):
@@ -61,5 +76,7 @@ def _rule(table: Any, variants: Sequence[str], where: str) -> Rule:
         count = table.get(key, 1)
         if not isinstance(count, int) or isinstance(count, bool) or count < 1:
             raise InputError(f"{where}: {key} = {count!r}; expected a whole number above zero")
+    if not isinstance(table.get("tuned_as", ""), str):
+        raise InputError(f"{where}: tuned_as = {table['tuned_as']!r}; expected the name of an estimator")
     fields: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}
     return Rule(**fields)
