@@ -174,9 +174,13 @@ def _where(ax: Axes, first: Model, last: Model, record: Record, found: Discrepan
     ax.fill_between(centre, b.mean[seen] - spread, b.mean[seen] + spread, color=SKY, alpha=0.4, linewidth=0, zorder=3)
     ax.plot(centre, b.mean[seen], "o-", color=INK, markersize=4, linewidth=1.2, label="d, mean of a bin", zorder=4)
     if list(last.states) == list(first.states) and str(last) != str(first):
-        u = record.u
-        added = np.array([last.rate(record.t[k], found.x[k], u[k])[i] - first.rate(record.t[k], found.x[k], u[k])[i]
-                          for k in kept])  # fmt: skip
+        inputs, times = record.u.tolist(), record.t.tolist()
+
+        def gap(k: int) -> float:
+            x, u = found.x[k], inputs[k]
+            return float(last.rate(times[k], x, u)[i] - first.rate(times[k], x, u)[i])
+
+        added = np.array([gap(k) for k in kept.tolist()])
         shown += [float(added.min()), float(added.max())]
         order = np.argsort(v[kept], kind="stable")
         if np.abs(np.diff(added[order])).sum() < 8 * (np.ptp(added) or 1.0):
@@ -184,13 +188,18 @@ def _where(ax: Axes, first: Model, last: Model, record: Record, found: Discrepan
                 v[kept][order], added[order], color=ORANGE, linewidth=2.2, label="rate amended − rate given", zorder=5
             )
         else:
-            dots(ax, v[kept], added, ORANGE, "what the effect adds", 2.4)
+            dots(ax, v[kept], added, ORANGE, "rate amended − rate given", 2.4)
     # A single sample at which the smoother jumps is no reason to flatten all others.
     margin = 0.12 * (max(shown) - min(shown))
     ax.set_ylim(min(shown) - margin, max(shown) + margin)
     ax.axhline(0, color=INK, linewidth=0.8)
     label = label_of(first, record, found.variable)
-    dressed(ax, label, f"missing in {found.equation}'", f"Where: d against {found.variable}")
+    dressed(
+        ax,
+        label,
+        f"missing in {found.equation}'",
+        f"Where: d, of which {found.variable} orders {100 * found.ratio:.0f} %",
+    )
 
 
 def _what(ax: Axes, row: Row) -> None:
