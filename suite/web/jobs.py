@@ -6,10 +6,12 @@ Short tasks go to the process that answered last, which still holds the model; l
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import multiprocessing
+import threading
 from collections import deque
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from multiprocessing import forkserver
 from typing import Any
 
 from suite.processes import interrupts_held
@@ -29,21 +31,35 @@ class RefusedError(Exception):
 
 
 class Hand:
-    """One process and the pipe to it."""
+    """One process and the pipe to it. It starts when `begin` is called, which waits until it can work."""
 
     def __init__(self) -> None:
         context = _context()
-        self.pipe, far = context.Pipe()
-        self.process = context.Process(target=worker.serve, args=(far,), daemon=True)
+        self.pipe, self.far = context.Pipe()
+        self.process = context.Process(target=worker.serve, args=(self.far,), daemon=True)
+        self.unwanted = False
+        self.ready: asyncio.Future[Any] | None = None
+
+    def begin(self) -> None:
+        """Start the process and hear that it has; for a thread, since both take as long as loading does."""
         with interrupts_held():
             self.process.start()
-        far.close()
-        self.ready = False
+        self.far.close()
+        if self.unwanted:
+            self.process.kill()
+        self.pipe.recv()
 
     def end(self) -> None:
         """Kill the process; whoever still reads from it finds the end of the pipe."""
-        self.process.kill()
-        self.process.join()
+        self.unwanted = True
+        if self.process.pid is not None:
+            self.process.kill()
+            self.process.join()
+
+    @property
+    def alive(self) -> bool:
+        """Whether it works or still starts."""
+        return self.process.pid is None or self.process.is_alive()
 
 
 def _context() -> Any:
@@ -58,6 +74,28 @@ def _context() -> Any:
     return context
 
 
+def _in_thread(call: Callable[[], Any]) -> asyncio.Future[Any]:
+    """The result of a call that waits. Its thread holds nothing up when the server stops, unlike a pool's."""
+    loop = asyncio.get_running_loop()
+    future: asyncio.Future[Any] = loop.create_future()
+
+    def settle(result: Any, error: BaseException | None) -> None:
+        if not future.done():
+            future.set_exception(error) if error is not None else future.set_result(result)
+
+    def run() -> None:
+        result, failure = None, None
+        try:
+            result = call()
+        except Exception as error:  # whoever awaits the future gets it
+            failure = error
+        with contextlib.suppress(RuntimeError):  # the loop is closed: nobody waits any more
+            loop.call_soon_threadsafe(settle, result, failure)
+
+    threading.Thread(target=run, daemon=True).start()
+    return future
+
+
 class Crew:
     """All processes of a server; its methods belong to one event loop."""
 
@@ -65,20 +103,22 @@ class Crew:
         self.idle: deque[Hand] = deque()
         self.all: set[Hand] = set()
         self.room = asyncio.Semaphore(MOST)
-        self.threads = ThreadPoolExecutor(MOST, thread_name_prefix="pipe")
         self.closed = False
 
     def start(self) -> None:
-        """Have processes that are warm when the first task comes."""
+        """Have processes that are warm when the first task comes; for the main thread, with which they end."""
+        if "forkserver" in multiprocessing.get_all_start_methods():
+            _context()
+            with interrupts_held():
+                forkserver.ensure_running()
         while len(self.idle) < KEPT and len(self.all) < MOST and not self.closed:
             self.idle.appendleft(self._new())
 
     def close(self) -> None:
         """End every process, whatever it does."""
         self.closed = True
-        for hand in self.all:
+        for hand in list(self.all):
             hand.end()
-        self.threads.shutdown(wait=False)
 
     async def call(self, name: str, *arguments: Any) -> Any:
         """The answer of a short task."""
@@ -99,9 +139,9 @@ class Crew:
             hand = self._take(long)
             sound = False
             try:
-                if not hand.ready:
-                    await self._message(hand)
-                    hand.ready = True
+                assert hand.ready is not None
+                # Another may wait for the same process after this one has left.
+                await self._heard(hand, asyncio.shield(hand.ready))
                 hand.pipe.send((name, arguments))
                 while True:
                     kind, said = await self._message(hand)
@@ -120,18 +160,21 @@ class Crew:
         raise RefusedError(said, status=500)
 
     async def _message(self, hand: Hand) -> tuple[str, Any]:
-        """The next thing a process says; reading waits in a thread, since a pipe's end is no socket everywhere."""
-        try:
-            answer: tuple[str, Any] = await asyncio.get_running_loop().run_in_executor(self.threads, hand.pipe.recv)
-        except (EOFError, OSError, RuntimeError):
-            raise self._lost(hand) from None
+        """The next thing a process says."""
+        answer: tuple[str, Any] = await self._heard(hand, _in_thread(hand.pipe.recv))
         return answer
+
+    async def _heard(self, hand: Hand, future: asyncio.Future[Any]) -> Any:
+        try:
+            return await future
+        except (EOFError, OSError):
+            raise self._lost(hand) from None
 
     def _lost(self, hand: Hand) -> RefusedError:
         if self.closed:
             return RefusedError("the server was stopped", status=503)
-        hand.process.join(1.0)
-        code = hand.process.exitcode
+        hand.end()
+        code = hand.process.exitcode if hand.process.pid is not None else "none"
         return RefusedError(
             f"the computing process ended (code {code}); is there memory enough? Please try it again", status=500
         )
@@ -139,7 +182,7 @@ class Crew:
     def _take(self, long: bool) -> Hand:
         while self.idle:
             hand = self.idle.popleft() if long else self.idle.pop()
-            if hand.process.is_alive():
+            if hand.alive:
                 break
             self._bury(hand)
         else:
@@ -161,6 +204,9 @@ class Crew:
         if self.closed:
             raise RefusedError("the server was stopped", status=503)
         hand = Hand()
+        hand.ready = _in_thread(hand.begin)
+        # It may be ended before anybody waits for it; its failure is then no news.
+        hand.ready.add_done_callback(lambda ready: ready.cancelled() or ready.exception())
         self.all.add(hand)
         return hand
 
