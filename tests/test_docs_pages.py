@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from suite.model_file import read_model
+
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 WRITTEN = sorted(DOCS.glob("*.md")) if DOCS.is_dir() else []
@@ -122,3 +124,23 @@ def test_the_site_builds_without_a_warning_and_loads_nothing_from_elsewhere(tmp_
     text = (tmp_path / "site" / "mathematics.html").read_text(encoding="utf-8")
     assert text.count("<math") > 40
     assert "arithmatex" not in text
+
+
+@pytest.mark.parametrize("page", ["own-data.md", "write-a-model.md"])
+def test_the_python_of_a_page_runs(page: str) -> None:
+    """Its blocks, one after another, as they stand."""
+    blocks = re.findall(r"```python\n(.*?)```", (DOCS / page).read_text(encoding="utf-8"), re.DOTALL)
+    assert blocks
+    exec(compile("\n".join(blocks), page, "exec"), {})
+
+
+def test_the_model_of_the_page_is_the_same_in_both_languages(tmp_path: Path) -> None:
+    """The file and the Python below it say the same, but for the name of the source."""
+    text = (DOCS / "write-a-model.md").read_text(encoding="utf-8")
+    file, code = (re.search(rf"```{kind}\n(.*?)```", text, re.DOTALL) for kind in ("toml", "python"))
+    assert file is not None
+    assert code is not None
+    (tmp_path / "plant.toml").write_text(file[1], encoding="utf-8")
+    built: dict[str, object] = {}
+    exec(compile(code[1], "write-a-model.md", "exec"), built)
+    assert read_model(tmp_path / "plant.toml") == built["model"]

@@ -47,7 +47,7 @@ from suite.report.canvas import (
 from suite.report.failure import label_of
 from suite.report.figures import plain
 
-MOST = 700  # points of a curve: a picture stays below 150 kB
+MOST = 600  # points of a curve: a picture stays below 150 kB
 AGREES = 0.05  # of the stored error: how closely a model built again must reach it
 Row = Mapping[str, Any]
 
