@@ -245,7 +245,9 @@ def test_a_port_that_is_taken_is_one_sentence(capsys: pytest.CaptureFixture[str]
     assert "taken" in err
 
 
-@pytest.mark.parametrize("arguments", [["nothing.toml"], ["."], ["--store", "nothing.sqlite"], ["--port", "65536"]])
+@pytest.mark.parametrize(
+    "arguments", [["nothing.toml"], ["."], [sys.executable], ["--store", "nothing.sqlite"], ["--port", "65536"]]
+)
 def test_what_cannot_be_opened_is_refused_at_the_start(
     arguments: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:

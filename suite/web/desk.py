@@ -17,10 +17,10 @@ ANALYSES = 100  # the oldest is forgotten first
 
 @dataclass
 class Desk:
-    """`model` and `data` were named at the start, `store` holds results of the benchmark."""
+    """The text `model` and the files `data` were named at the start, `store` holds results of the benchmark."""
 
     port: int
-    model: Path | None = None
+    model: str | None = None
     data: Sequence[Path] = ()
     store: Path | None = None
     token: str = field(default_factory=lambda: secrets.token_urlsafe(32))
@@ -50,7 +50,7 @@ class Desk:
         self.examples.add_done_callback(lambda task: task.cancelled() or task.exception())
         if self.model is not None:
             data = [self.uploads.given(path).to_json() for path in self.data]
-            self.loaded = {"model": self.model.read_text(encoding="utf-8-sig"), "data": data}
+            self.loaded = {"model": self.model, "data": data}
 
     def close(self) -> None:
         """End the processes, remove the temporary files."""

@@ -23,8 +23,9 @@ MODEL_LIMIT = 1_000_000
 
 def run(args: argparse.Namespace) -> int:
     """Serve the page on the loopback interface; 0 when it is stopped."""
-    for path in [*([args.model] if args.model else []), *args.data, *([args.store] if args.store else [])]:
+    for path in (*args.data, args.store):
         _readable(path)
+    model = _text(args.model)
     try:
         import starlette  # noqa: F401
         import uvicorn  # noqa: F401
@@ -34,7 +35,7 @@ def run(args: argparse.Namespace) -> int:
     # Ended in order: what is removed at exit is removed then too.
     signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
     try:
-        _serve(args, listener)
+        _serve(args, model, listener)
     except KeyboardInterrupt:
         pass
     finally:
@@ -43,14 +44,14 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _serve(args: argparse.Namespace, listener: socket.socket) -> None:
+def _serve(args: argparse.Namespace, model: str | None, listener: socket.socket) -> None:
     import uvicorn
 
     from suite.web.app import application
     from suite.web.desk import Desk
 
     port = listener.getsockname()[1]
-    desk = Desk(port, args.model, args.data, args.store)
+    desk = Desk(port, model, args.data, args.store)
 
     class Server(uvicorn.Server):
         """Ends its processes at the first interrupt, so that no answer is waited for."""
@@ -97,8 +98,23 @@ def _bound(port: int | None) -> socket.socket:
     raise InputError(f"--port: {which} taken or not allowed; choose another, or --port 0 for any free one")
 
 
-def _readable(path: Path) -> None:
-    """Refuse at once what cannot be opened; what is in it the page says."""
+def _text(path: Path | None) -> str | None:
+    """The text of the model file; what is wrong in it the page says, at its line."""
+    _readable(path)
+    if path is None:
+        return None
+    if path.stat().st_size > MODEL_LIMIT:
+        raise InputError(f"{path}: larger than 1 MB, too large for a model file; is it the data? The model comes first")
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: not a text file in UTF-8; the model comes first, then the data") from None
+
+
+def _readable(path: Path | None) -> None:
+    """Refuse at once what cannot be opened."""
+    if path is None:
+        return
     if not path.is_file():
         raise InputError(f"{path}: {'is a folder' if path.is_dir() else 'no such file'}; check the path")
     with path.open("rb"):
