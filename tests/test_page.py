@@ -1,4 +1,4 @@
-"""An engineer sees on the page where a model fails, adds what is missing, watches the error fall, and keeps the result."""
+"""On the page one sees where a model fails, adds what is missing, watches the error fall, and keeps the result."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from suite.model_file import read_model
 pytest.importorskip("starlette", reason="the extra web is not installed")
 api = pytest.importorskip("playwright.sync_api", reason="the browser tests need playwright")
 CHROMIUM = shutil.which("chromium")
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="the browser tests need chromium (Debian: apt-get install chromium)")
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt-get install chromium)")
 
 LONG = 180_000  # ms; an analysis takes seconds, on a busy machine many
 MODEL = """name = "decay"
@@ -47,7 +47,7 @@ def served(serve: Callable[..., Any]) -> Any:
 
 @pytest.fixture
 def opened(browser: Any, served: Any) -> Iterator[Callable[..., Any]]:
-    """Open the page in a tab of a new visitor; afterwards: nothing was said to the console, no request left the machine."""
+    """Open the page for a new visitor; afterwards the console is empty, and no request has left the machine."""
     said: list[str] = []
     asked: list[str] = []
     contexts = []

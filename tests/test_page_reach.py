@@ -1,4 +1,4 @@
-"""The page can be used by keys alone, on a narrow screen, in two tabs at once; it survives its server; nobody else gets in."""
+"""The page works by keys alone, on a narrow screen, in two tabs and without its server; nobody else gets in."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ import pytest
 pytest.importorskip("starlette", reason="the extra web is not installed")
 api = pytest.importorskip("playwright.sync_api", reason="the browser tests need playwright")
 CHROMIUM = shutil.which("chromium")
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="the browser tests need chromium (Debian: apt-get install chromium)")
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt-get install chromium)")
 
 LONG = 180_000  # ms
 PLAN = """cases = ["paper-cubic"]
@@ -178,12 +178,10 @@ def test_other_names_and_other_pages_are_refused(context: Any, served: Any, tmp_
 
     # A page of another origin in the same browser, which holds the cookie, may post nothing and read nothing.
     target = f"{served.origin}/api/example"
-    script = f"""fetch({target!r}, {{method: "POST", credentials: "include", mode: "no-cors", body: '{{"name": "mug"}}'}})
+    script = f"""fetch({target!r}, {{method: "POST", credentials: "include", mode: "no-cors", body: '{{}}'}})
         .then(() => document.body.append("sent"), () => document.body.append("failed"));"""
     (tmp_path / "index.html").write_text(f"<body><script>{script}</script>", encoding="utf-8")
-    foreign = ThreadingHTTPServer(
-        ("127.0.0.1", 0), partial(SimpleHTTPRequestHandler, directory=str(tmp_path))
-    )
+    foreign = ThreadingHTTPServer(("127.0.0.1", 0), partial(SimpleHTTPRequestHandler, directory=str(tmp_path)))
     threading.Thread(target=foreign.serve_forever, daemon=True).start()
     statuses: list[int] = []
     stranger.on("response", lambda response: statuses.append(response.status) if response.url == target else None)
@@ -199,7 +197,17 @@ def test_the_benchmark_sorts_filters_and_opens_the_trajectories_of_a_row(
 ) -> None:
     (tmp_path / "plan.toml").write_text(PLAN, encoding="utf-8")
     store = tmp_path / "results.sqlite"
-    command = [sys.executable, "-m", "suite", "bench", "run", "--plan", str(tmp_path / "plan.toml"), "--store", str(store)]
+    command = [
+        sys.executable,
+        "-m",
+        "suite",
+        "bench",
+        "run",
+        "--plan",
+        str(tmp_path / "plan.toml"),
+        "--store",
+        str(store),
+    ]
     subprocess.run(command, check=True, capture_output=True)
     page = ready(context, serve("--store", str(store)))
     page.get_by_role("button", name="Benchmark").click()

@@ -26,6 +26,12 @@ function draw() {
   const held = pane.contains(document.activeElement);
   pane.replaceChildren(make("ol", { class: "history" }, ...state.history.map(row)));
   if (held) pane.querySelector("[aria-current]")?.focus();
+  shown();
 }
+
+/** The step in view stands within the part of the list that is seen. */
+const shown = () => at("pane-history").querySelector("[aria-current]")?.scrollIntoView({ block: "nearest" });
+
+at("tab-history").addEventListener("click", shown);
 
 on("step choice", draw);
