@@ -1,4 +1,4 @@
-"""The pictures of the page in docs/pictures, made again in a real browser: `tox -e pictures`."""
+"""The pictures of the page in docs/pictures, made again in a real browser: `tox -e page-pictures`."""
 
 from __future__ import annotations
 

@@ -192,3 +192,23 @@ def test_own_files_are_opened_and_what_is_wrong_with_them_is_said_where_it_belon
     page.get_by_role("button", name="Apply").click()
     page.locator("#sources", has_text="edited").wait_for()
     assert page.locator("#model-error").inner_text() == ""
+
+
+def test_a_model_and_its_data_dropped_on_the_page_are_opened_together(opened: Callable[..., Any]) -> None:
+    page = opened()
+    rows = "t,x\n" + "".join(f"{0.1 * k},{0.9**k}\n" for k in range(40))
+    dropped = page.evaluate_handle(
+        """([model, rows]) => {
+            const dropped = new DataTransfer();
+            dropped.items.add(new File([rows], "run.csv"));
+            dropped.items.add(new File([model], "decay.toml"));
+            return dropped;
+        }""",
+        [MODEL, rows],
+    )
+    page.dispatch_event("body", "dragenter", {"dataTransfer": dropped})
+    assert page.get_by_text("Drop the model").is_visible()
+    page.dispatch_event("body", "drop", {"dataTransfer": dropped})
+    drawn(page)
+    assert page.locator("#sources").inner_text() == "decay.toml · run.csv"
+    assert page.get_by_text("Drop the model").is_hidden()
