@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from suite import plugins
 from suite.model_file import read_model
 
 ROOT = Path(__file__).parents[1]
@@ -144,3 +145,11 @@ def test_the_model_of_the_page_is_the_same_in_both_languages(tmp_path: Path) -> 
     built: dict[str, object] = {}
     exec(compile(code[1], "write-a-model.md", "exec"), built)
     assert read_model(tmp_path / "plant.toml") == built["model"]
+
+
+def test_the_pages_count_the_effects_right() -> None:
+    """Where a page says how many effects the library holds."""
+    pages = [DOCS / "idea.md", DOCS / "tutorial.md"]
+    said = re.findall(r"\b(\d+) effects\b", "".join(path.read_text(encoding="utf-8") for path in pages))
+    assert len(said) == 2
+    assert {int(count) for count in said} == {len(plugins.effects())}
