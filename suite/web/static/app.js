@@ -33,6 +33,8 @@ function views() {
   at("empty").hidden = Boolean(entry) || benching();
   at("work").hidden = !entry || benching();
   at("bench").hidden = !benching();
+  // The sentence is about the model of the workbench.
+  at("said").hidden = benching();
 }
 
 function buttons() {
