@@ -11,7 +11,7 @@ export const state = {
   equation: null,
   variable: null,
   preview: null, // {candidate index, step: STEP}
-  busy: null, // AbortController of the running analysis
+  busy: null, // {stop, entry, said, since, done} of the running analysis
   interval: null, // [t0, t1] marked in all plots
 };
 

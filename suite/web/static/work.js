@@ -34,7 +34,12 @@ export async function analysed() {
   problem("");
   const stop = new AbortController();
   state.busy = { stop, entry, said: "Starting", since: performance.now() };
+  state.busy.done = run(entry, stop);
   tell("busy");
+  await state.busy.done;
+}
+
+async function run(entry, stop) {
   try {
     const analysis = await askAnalysis(entry.start ?? entry.model, entry.data, stop.signal, ({ progress }) => {
       state.busy.said = progress;
@@ -97,6 +102,6 @@ export async function added(index) {
   cancel();
   const entry = push({ label: `+ ${candidate.label}`, model: candidate.model, start: candidate.start, data, origin: "added", step: candidate.seen ?? null });
   await compared(entry);
-  while (state.busy) await new Promise((resolve) => requestAnimationFrame(resolve));
+  await state.busy?.done;
   if (current() === entry) await analysed();
 }
