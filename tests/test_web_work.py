@@ -246,7 +246,7 @@ def test_a_port_that_is_taken_is_one_sentence(capsys: pytest.CaptureFixture[str]
 
 
 @pytest.mark.parametrize(
-    "arguments", [["nothing.toml"], ["."], [sys.executable], ["--store", "nothing.sqlite"], ["--port", "65536"]]
+    "arguments", [["nothing.toml"], ["."], [sys.executable], ["--store", "no.sqlite"], ["--port", "65536"]]
 )
 def test_what_cannot_be_opened_is_refused_at_the_start(
     arguments: list[str], capsys: pytest.CaptureFixture[str]

@@ -30,6 +30,8 @@ class Desk:
     analyses: OrderedDict[str, bytes] = field(default_factory=OrderedDict)
     examples: asyncio.Task[str] | None = None
     loaded: dict[str, object] | None = None
+    # One simulation at a time: all go to the process that has the model ready.
+    sliding: asyncio.Lock = field(default_factory=asyncio.Lock)
 
     @property
     def cookie(self) -> str:

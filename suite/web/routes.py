@@ -7,7 +7,7 @@ import json
 import secrets
 from collections.abc import Callable
 
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, Request
 from starlette.responses import FileResponse, HTMLResponse, RedirectResponse, Response
 from starlette.routing import Route
 
@@ -97,8 +97,12 @@ async def compare(request: Request) -> Response:
 async def simulate(request: Request) -> Response:
     """The free run at the values of the sliders."""
     desk, said = desk_of(request), await asked(request)
-    files = desk.uploads.find(said.names("data"))
-    return _json(await desk.crew.call("simulate", said.text("model"), files, said.numbers("values")))
+    source, files, numbers = said.text("model"), desk.uploads.find(said.names("data")), said.numbers("values")
+    async with desk.sliding:
+        # A slider has moved on meanwhile.
+        if await request.is_disconnected():
+            raise ClientDisconnect
+        return _json(await desk.crew.call("simulate", source, files, numbers))
 
 
 async def values(request: Request) -> Response:

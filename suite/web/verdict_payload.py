@@ -26,13 +26,13 @@ from suite.web.payloads import digits
 Array = npt.NDArray[np.float64]
 
 CURVE = 400  # points of a candidate's curve
+WORTH = 0.01  # weight from which a rival is named in the headline
 
 
 def verdict(found: Search, said: Verdict, step: Step, record: Record, effects: Mapping[str, Effect]) -> dict[str, Any]:
     """The object VERDICT: that of `diagnose --json` with the candidates in full."""
     candidates = [_candidate(found, said, k, step, record, effects) for k in range(len(said.plausible))]
-    held = sum(candidate.weight for candidate in said.plausible)
-    return said.to_json() | {"candidates": candidates, "none": min(max(1.0 - held, 0.0), 1.0)}
+    return said.to_json() | {"candidates": candidates, "none": none(said)}
 
 
 def headline(said: Verdict, step: Step, record: Record) -> str:
@@ -54,11 +54,21 @@ def _missing(said: Verdict) -> str:
     removed = f"; removes {100 * removes(said, first):.0f} % of the error"
     if said.verdict == "missing_effect":
         return f"Most likely missing: {label(first.effects)} ({percent(first.weight)}){removed}."
-    rivals = [f"{label(c.effects)} ({percent(c.weight)})" for c in said.plausible[:3]]
-    if len(rivals) == 1:
-        return f"An effect is missing; closest: {rivals[0]}{removed}."
-    more = f" and {len(said.plausible) - 3} more" if len(said.plausible) > 3 else ""
-    return f"An effect is missing; plausible: {', '.join(rivals)}{more}."
+    closest = f"An effect is missing; closest: {label(first.effects)} ({percent(first.weight)})"
+    rest = none(said)
+    if rest > first.weight:
+        return f"{closest}, but more likely none of the library is all of it ({percent(rest)})."
+    told = [c for c in said.plausible if c.weight >= WORTH]
+    if len(told) < 2:
+        return f"{closest}{removed}."
+    rivals = ", ".join(f"{label(c.effects)} ({percent(c.weight)})" for c in told[:3])
+    more = f" and {len(told) - 3} more" if len(told) > 3 else ""
+    return f"An effect is missing; plausible: {rivals}{more}."
+
+
+def none(said: Verdict) -> float:
+    """The weight of "none of these", 0..1."""
+    return min(max(1.0 - sum(candidate.weight for candidate in said.plausible), 0.0), 1.0)
 
 
 def label(effects: tuple[Named, ...]) -> str:
