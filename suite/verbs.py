@@ -15,6 +15,7 @@ from typing import Any
 
 from suite import plugins
 from suite.discovery import checkup, misfit
+from suite.discovery.adding import added
 from suite.discovery.evidence import evidence
 from suite.discovery.fit import fit, prepare
 from suite.discovery.library import candidates
@@ -150,10 +151,7 @@ def add(args: argparse.Namespace) -> int:
         )
     term = chosen_term(model, args.effect, args.equation, args.term)
     record = read_record(args.data, model) if args.data else None
-    start = start_numbers(model, term, record)
-    new = grown(model, [term], [start])
-    if record is not None:
-        new = fit(new, record).model
+    new = grown(model, [term], [start_numbers(model, term, None)]) if record is None else added(model, record, term)
     write_model(new, args.output)
     before, after = to_toml(model).splitlines(), to_toml(new).splitlines()
     diff = list(difflib.unified_diff(before, after, str(args.model), str(args.output), lineterm="", n=1))

@@ -136,3 +136,17 @@ def test_an_interrupt_ends_with_130_and_leaves_no_half_file(plant: tuple[str, st
     assert out == ""
     assert "Traceback" not in err
     assert not list(folder.rglob("*.tmp"))
+
+
+def test_an_effect_with_a_state_of_its_own_is_fitted_when_it_is_added(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The second compartment does not stay at zero, where it started: the error falls to the noise."""
+    folder = tmp_path / "drug"
+    assert main(["example", "drug-second-compartment", str(folder)]) == 0
+    model, data, new = str(folder / "model.toml"), str(folder / "data.csv"), str(folder / "new.toml")
+    assert main(["add", model, "second_compartment", "--equation", "c", "--data", data, "-o", new]) == 0
+    capsys.readouterr()
+    assert main(["compare", new, data, "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["error"]["c"] < 1.2 * said["noise"]["c"]
