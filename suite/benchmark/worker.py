@@ -128,6 +128,8 @@ def _serve(pipe: Connection) -> None:
     with contextlib.suppress(OSError):
         os.dup2(2, 1)
     with contextlib.suppress(KeyboardInterrupt, EOFError, BrokenPipeError, ConnectionResetError):
+        # There is a process for each core already.
+        os.environ.setdefault("UNMODELLED_THREADS", "1")
         importlib.import_module("suite.benchmark.cells")
         # Not in the first task's time: the plug-ins and their models take seconds to build.
         plugins.estimators()

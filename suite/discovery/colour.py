@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from suite.discovery.abreast import each
 from suite.discovery.engine import Problem
 from suite.discovery.fit import Hypothesis, Level, levenberg_marquardt
 from suite.discovery.identify import ALARM, REFITTED, Search, needs_more, refit
@@ -38,14 +39,16 @@ def coloured(found: Search) -> Search:
     if not (np.abs(rho) > 2.0 / np.sqrt(problem.count / len(rho))).any():
         return found
     changed = problem.coloured(rho)
-    hypotheses = [_refitted(changed, h) for h in (found.base, *found.fitted) if h.exact.passed.finite]
+    sound = [h for h in (found.base, *found.fitted) if h.exact.passed.finite]
+    hypotheses = each(lambda h: _refitted(changed, h), sound)
     if not hypotheses or hypotheses[0].active:
         return found
     base, fitted = hypotheses[0], hypotheses[1:]
     trial = Search(changed, base, tuple(fitted), found.absorbed, found.frequencies, found.scores, found.seconds)
     known = {frozenset(h.active) for h in fitted}
     fresh = [s for s in score(changed, base, found.absorbed, exact=True)[:REFITTED] if frozenset([s.k]) not in known]
-    trial = replace(trial, fitted=(*fitted, *(refit(changed, base, (s.k,), [s]) for s in fresh if s.LM > ALARM)))
+    more = each(lambda s: refit(changed, base, (s.k,), [s]), (s for s in fresh if s.LM > ALARM))
+    trial = replace(trial, fitted=(*fitted, *more))
     chosen = min([trial.base, *trial.fitted], key=trial.criterion)
     price = len(rho) * np.log(problem.count)
     rival = min(found.criterion(h, h.best) for h in (found.base, *found.fitted))

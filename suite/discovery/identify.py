@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
 
+from suite.discovery.abreast import each
 from suite.discovery.engine import Problem
 from suite.discovery.fit import LEVELS, RISEN, Hypothesis, Level, homotopy, polish, substeps
 from suite.discovery.frame import Point
@@ -79,7 +80,7 @@ def search(problem: Problem) -> Search:
     skipped = absorbed(problem, base)
     scores = score(problem, base, skip=skipped)
     found = Search(problem, base, (), skipped, len(frequencies(problem)), tuple(scores))
-    fitted = [refit(problem, base, (s.k,), [s]) for s in scores[:REFITTED] if s.LM > 0]
+    fitted = each(lambda s: refit(problem, base, (s.k,), [s]), (s for s in scores[:REFITTED] if s.LM > 0))
     fitted = _converged(found, fitted)
     found = replace(found, fitted=tuple(fitted))
     if fitted:
@@ -152,10 +153,9 @@ def _converged(found: Search, fitted: Sequence[Hypothesis]) -> list[Hypothesis]:
     if not fitted:
         return []
     best = min(found.criterion(hypothesis) for hypothesis in fitted)
-    return [
-        polish(found.problem, hypothesis) if found.criterion(hypothesis) < best + CLOSE else hypothesis
-        for hypothesis in fitted
-    ]
+    close = [hypothesis for hypothesis in fitted if found.criterion(hypothesis) < best + CLOSE]
+    polished = dict(zip(map(id, close), each(lambda h: polish(found.problem, h), close), strict=True))
+    return [polished.get(id(hypothesis), hypothesis) for hypothesis in fitted]
 
 
 def _grow(found: Search) -> Search:
@@ -166,12 +166,15 @@ def _grow(found: Search) -> Search:
     problem = found.problem
     known = {frozenset(hypothesis.active): hypothesis for hypothesis in found.fitted}
 
-    def extend(parent: Hypothesis, entries: Sequence[Score]) -> None:
-        active = (*parent.active, *(entry.k for entry in entries))
-        terms = [problem.terms[k] for k in active]
-        apart = any(incompatible(a, b) for i, a in enumerate(terms) for b in terms[i + 1 :])
-        if frozenset(active) not in known and not apart:
-            known[frozenset(active)] = refit(problem, parent, active, entries)
+    def extend(wanted: Iterable[tuple[Hypothesis, Sequence[Score]]]) -> None:
+        fresh: dict[frozenset[int], tuple[Hypothesis, tuple[int, ...], Sequence[Score]]] = {}
+        for parent, entries in wanted:
+            active = (*parent.active, *(entry.k for entry in entries))
+            terms = [problem.terms[k] for k in active]
+            apart = any(incompatible(a, b) for i, a in enumerate(terms) for b in terms[i + 1 :])
+            if frozenset(active) not in known and not apart:
+                fresh.setdefault(frozenset(active), (parent, active, entries))
+        known.update(zip(fresh, each(lambda job: refit(problem, *job), fresh.values()), strict=True))
 
     def bent(k: int) -> bool:
         effect = problem.terms[k].effect
@@ -190,24 +193,21 @@ def _grow(found: Search) -> Search:
     for size in (2, 3):
         beam = sorted((h for h in known.values() if len(h.active) == size - 1), key=found.criterion)[:BEAM]
         best = min([found.base, *known.values()], key=found.criterion)
+        wanted: list[tuple[Hypothesis, Sequence[Score]]] = []
         if size == 2:
-            for both in pairs(problem, found.base, found.scores, PAIRS):
-                extend(found.base, both)
+            wanted += [(found.base, both) for both in pairs(problem, found.base, found.scores, PAIRS)]
         for parent in beam:
-            for entry in score(problem, parent, skip=found.absorbed)[:NEXT]:
-                extend(parent, [entry])
+            wanted += [(parent, [entry]) for entry in score(problem, parent, skip=found.absorbed)[:NEXT]]
             # A force that bends off at a width of its own imitates a polynomial of one term more.
             for k in filter(bent, parent.active) if size == 3 and parent is beam[0] else ():
                 rest, scores = without(parent, k)
-                for both in pairs(problem, rest, scores, 2):
-                    extend(rest, both)
+                wanted += [(rest, both) for both in pairs(problem, rest, scores, 2)]
+        extend(wanted)
         # Swap and drop: the best set with each of its members replaced or removed, and again the one it leads to.
         for _ in range(ROUNDS):
             grown = sound()
-            for k in grown.active if len(grown.active) == size else ():
-                rest, scores = without(grown, k)
-                for entry in scores[:SWAPPED]:
-                    extend(rest, [entry])
+            others = [without(grown, k) for k in grown.active if len(grown.active) == size]
+            extend((rest, [entry]) for rest, scores in others for entry in scores[:SWAPPED])
             if found.criterion(sound()) > found.criterion(grown) - ALARM:
                 break
         fitted = _converged(found, list(known.values()))
