@@ -43,18 +43,18 @@ def discover(
         found = investigate(current, record, effects, absolute)
         verdict, named = judge(found)
         first = first or verdict
-        step = _step(found, verdict)
+        step = step_of(found, verdict)
         steps.append(step)
-        history.append(_row(number, step, model))
+        history.append(history_row(number, step, model))
         progress(verdict.sentence)
         if verdict.verdict not in ("missing_effect", "ambiguous") or number == ROUNDS or not named.active:
             break
         current = amended(found.problem, named, fitted=False)
     assert first is not None
-    return Ledger(record, tuple(steps), _conclusion(first, steps), tuple(history))
+    return Ledger(record, tuple(steps), conclusion(first, steps), tuple(history))
 
 
-def _step(found: Search, verdict: Verdict) -> Step:
+def step_of(found: Search, verdict: Verdict) -> Step:
     problem, base = found.problem, found.base
     fitted = summarise(problem, base)
     names = list(problem.model.outputs)
@@ -72,7 +72,7 @@ def _step(found: Search, verdict: Verdict) -> Step:
     )
 
 
-def _row(number: int, step: Step, original: Model) -> dict[str, object]:
+def history_row(number: int, step: Step, original: Model) -> dict[str, object]:
     """One line of the ledger: what the model has gained so far, and its errors."""
     added = {
         name: step.model.parameters[name].value for name in step.model.parameters if name not in original.parameters
@@ -89,7 +89,7 @@ def _row(number: int, step: Step, original: Model) -> dict[str, object]:
     }
 
 
-def _conclusion(first: Verdict, steps: list[Step]) -> str:
+def conclusion(first: Verdict, steps: list[Step]) -> str:
     """The first verdict, and what the loop made of it."""
     if len(steps) == 1:
         return first.sentence

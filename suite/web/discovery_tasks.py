@@ -51,7 +51,7 @@ def analyse(source: str, files: Sequence[tuple[str, str]], absolute: bool, key: 
     tell(f"Judging {len(found.fitted)} hypotheses")
     verdict, _ = judge(found)
     tell("Smoothing the model error")
-    step = loop._step(found, verdict)
+    step = loop.step_of(found, verdict)
     shown = step_payload(step.model, record, step.comparison, step.discrepancy, step.held_out, step.autocorrelation)
     said = {
         "id": key,
@@ -77,10 +77,10 @@ def report(kept: Sequence[bytes], tell: Tell) -> str:
     if any(entry.record.source != first.record.source for entry in rounds):
         raise InputError("the analyses are of different data; a report holds those of one record")
     steps = tuple(entry.step for entry in rounds)
-    history: list[dict[str, Any]] = [loop._row(k, step, first.given) for k, step in enumerate(steps)]
+    history: list[dict[str, Any]] = [loop.history_row(k, step, first.given) for k, step in enumerate(steps)]
     verdict = steps[0].verdict
     assert verdict is not None
-    ledger = Ledger(first.record, steps, loop._conclusion(verdict, list(steps)), tuple(history))
+    ledger = Ledger(first.record, steps, loop.conclusion(verdict, list(steps)), tuple(history))
     names = " ".join(shlex.quote(name) for name in first.record.names)
     effects = plugins.effects() | {effect.id: effect for effect in first.given.effects}
     with tempfile.TemporaryDirectory(prefix="unmodelled-") as folder:
