@@ -55,6 +55,7 @@ def discover(
 
 
 def step_of(found: Search, verdict: Verdict) -> Step:
+    """A round of the loop: the base model at its fitted values beside the record, what is left of it, the verdict."""
     problem, base = found.problem, found.base
     fitted = summarise(problem, base)
     names = list(problem.model.outputs)
