@@ -23,7 +23,7 @@ from suite.report.canvas import BAND95, BLUE, INK, ORANGE, dressed, legend_below
 
 Array = npt.NDArray[np.float64]
 Row = Mapping[str, Any]
-SECONDS = 2.0  # an estimate that took longer is not computed again
+SECONDS = 0.5  # an estimate that took longer is not computed again: a report of thirty cases stays within a minute
 LOOKS = ((BLUE, "-"), (ORANGE, "--"))
 
 
