@@ -67,7 +67,8 @@ def demands() -> str:
     with DEMANDS.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     cells = [["what", "figure", "95 % interval", "of", "wanted", "met"]]
-    for row in rows:
+    # What no record asked for has no figure.
+    for row in (row for row in rows if row["figure"]):
         figure, low, high = (f"{float(row[key]):.3g}" for key in ("figure", "low", "high"))
         what = row["what"].strip() if row["what"] == row["what"].lstrip() else f"– {row['what'].strip()}"
         met = "yes" if row["reached"] == "True" else "**no**"
