@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 import sympy
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from suite.expressions import FUNCTIONS, parse, symbol
@@ -60,6 +60,7 @@ EQUATIONS = st.recursive(_leaf(), _grown, max_leaves=6)
 
 
 @settings(max_examples=60, deadline=None)
+@example("min(x, abs(x))")
 @given(EQUATIONS)
 def test_values_and_slopes_are_those_of_slow_arithmetic(text: str) -> None:
     """Thirty digits and difference quotients agree with the compiled output, its Jacobian by state and parameter."""
@@ -72,10 +73,6 @@ def test_values_and_slopes_are_those_of_slow_arithmetic(text: str) -> None:
 
     value = exact()
     assume(abs(value) < 1e6)
-    # Where two arguments of min or max are equal, their slopes count for nothing.
-    at = {symbol(name): sympy.Float(value, 40) for name, value in POINT.items()}
-    sets = [[a.subs(at).evalf(40) for a in e.args] for e in expression.atoms(sympy.Min, sympy.Max)]
-    assume(all(len(set(values)) == len(values) for values in sets))
     y, Hx, Hp = _at(_compiled(["x", "v", text]))
     assert y[2] == pytest.approx(float(value), rel=1e-9, abs=1e-9)
     for name, slope in zip("xvab", [*Hx[2], *Hp[2]], strict=True):

@@ -223,7 +223,9 @@ class _Function:
         return self.chosen("ogt", x, ZERO, ONE, below)
 
     def step(self, e: Any, *_: Any) -> str:
-        return self.chosen("ogt", self.value(e), ZERO, ONE, ZERO)
+        # One half at the step: of equal arguments of min or max each then counts for its share.
+        x = self.value(e)
+        return self.chosen("ogt", x, ZERO, ONE, self.chosen("olt", x, ZERO, ZERO, HALF))
 
     def least(self, *terms: Any) -> str:
         return reduce(lambda old, new: self.chosen("olt", new, old, new, old), map(self.value, terms))
@@ -238,7 +240,7 @@ class _Function:
         return self.chosen("ogt", self.value(e), ZERO, self.call("log", self.value(e)), ZERO)
 
 
-ZERO, ONE = _number(0.0), _number(1.0)
+ZERO, HALF, ONE = _number(0.0), _number(0.5), _number(1.0)
 
 SPELLED: dict[str, Callable[..., str]] = {
     "Abs": _Function.absolute,
