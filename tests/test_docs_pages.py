@@ -10,6 +10,7 @@ import subprocess
 import sys
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -50,7 +51,7 @@ def test_every_link_leads_somewhere(page: Path) -> None:
             assert anchor in anchors(target.read_text(encoding="utf-8")), f"{page.name}: {link}"
 
 
-def pictures() -> object:
+def pictures() -> Any:
     """docs/pictures.py as a module."""
     spec = importlib.util.spec_from_file_location("pictures", DOCS / "pictures.py")
     assert spec is not None
@@ -65,15 +66,15 @@ def test_tables_of_a_page_are_those_of_the_stored_results(page: str) -> None:
     """Mend by `python docs/pictures.py --tables`, and the pictures by `tox run -e pictures`."""
     made = pictures()
     text = (DOCS / page).read_text(encoding="utf-8")
-    assert made.with_tables(text) == text  # type: ignore[attr-defined]
+    assert made.with_tables(text) == text
 
 
 @pytest.mark.parametrize("name", ["whiffle-ball", "emps", "silverbox", "cooling-mug"])
 def test_the_error_in_a_picture_is_the_stored_one(name: str) -> None:
     """The title of a case's picture has both errors of `bench measured`."""
     made = pictures()
-    rows = made.gallery.stored(made.MEASURED)  # type: ignore[attr-defined]
-    part = made.CASES[name]  # type: ignore[attr-defined]
+    rows = made.gallery.stored(made.MEASURED)
+    part = made.CASES[name]
     row = next(row for row in rows if (row["case"], row["part"]) == (name, part))
     drawn = (DOCS / "pictures" / f"{name}.svg").read_text(encoding="utf-8")
     title = re.search(r"<title>(.*?)</title>", drawn)

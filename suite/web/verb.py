@@ -11,6 +11,7 @@ import socket
 import sys
 import threading
 import webbrowser
+from importlib.util import find_spec
 from pathlib import Path
 from types import FrameType
 
@@ -26,11 +27,9 @@ def run(args: argparse.Namespace) -> int:
     for path in (*args.data, args.store):
         _readable(path)
     model = _text(args.model)
-    try:
-        import starlette  # noqa: F401
-        import uvicorn  # noqa: F401
-    except ImportError as error:
-        raise InputError(f"the page needs {error.name}; install it with: pip install 'unmodelled[web]'") from None
+    for name in ("starlette", "uvicorn"):
+        if find_spec(name) is None:
+            raise InputError(f"the page needs {name}; install it with: pip install 'unmodelled[web]'")
     listener = _bound(args.port)
     # Ended in order: what is removed at exit is removed then too.
     signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
