@@ -22,7 +22,9 @@ from suite.kernels.integrate import WORK, advance, speed
 from suite.kernels.matrix import (
     FLOW_WORK,
     MOST_PARTS,
+    fastest,
     integrated_flow,
+    multiply,
     semidefinite,
     transition_flow,
 )
@@ -30,7 +32,7 @@ from suite.kernels.matrix import (
 Array = npt.NDArray[np.float64]
 
 # A part of a sample is shorter than GAIN_REACH over the filter's own speed (RK4 is stable up to 2.7).
-GAIN_REACH = 1.0
+GAIN_REACH = 0.5
 # Beyond this a state is lost, whatever its unit.
 LOST = 1e100
 
@@ -128,13 +130,9 @@ def continuous_embedding(
                         if not (math.isnan(y[k - 1, c]) or math.isnan(y[k, c])):
                             B[i, j] += 2.0 * Hx[c, i] * Hx[c, j] / R[k, c]
             # The filter's speed: the model's, the gain's now, and what the gain settles to, sqrt(q / R).
-            gain = 0.0
-            settled = 0.0
-            for i in range(n):
-                for j in range(n):
-                    gain += S[i, j] * B[j, i]
-                    settled += W[i, j] * B[j, i]
-            own = speed(Fx) + max(abs(gain), math.sqrt(abs(settled)))
+            gain = fastest(S, B, half, end)
+            settled = fastest(W, B, half, end)
+            own = speed(Fx) + max(gain, math.sqrt(settled))
             h = min(dt / substeps, GAIN_REACH / own if own > 0.0 else dt)
             parts += 1
             if not math.isfinite(own) or parts > MOST_PARTS:
@@ -205,11 +203,7 @@ def discrete_embedding(
         if k > 0:
             dt = t[k] - t[k - 1]
             advance(rate, t[k - 1], dt, u[k - 1], u[k], linear, p, on, none, 1, x, T, advance_work)
-            for i in range(n):
-                for j in range(n):
-                    B[i, j] = 0.0
-                    for l in range(n):
-                        B[i, j] += T[i, l] * S[l, j]
+            multiply(T, S, B)
             for i in range(n):
                 for j in range(n):
                     M[i, j] = W[i, j] * dt

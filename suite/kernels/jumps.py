@@ -21,14 +21,14 @@ SERIES = (1.0, -0.5, *(EVEN.get(k, 0.0) for k in range(2, TERMS + 1)))
 SMALL = 1e-15  # of the sum: a term below this is rounding
 NOTHING = 1e-30  # of the largest rate: what a chain's far end has of a push at the other
 
-# f (n,); Fx (n, n), Fp (n, parameters), G (n, n), d (n, 1); A, E, T1, T2 (2n, 2n)
-JUMP_WORK = nb.types.Tuple((nb.VECTOR,) + (nb.MATRIX,) * 8)
+# f (n,); Fx (n, n), Fp (n, parameters), G (n, n), d (n, 1); A, E, A2, A3, A4, T (2n, 2n)
+JUMP_WORK = nb.types.Tuple((nb.VECTOR,) + (nb.MATRIX,) * 10)
 
 
 def jump_workspace(n: int, parameters: int) -> tuple[Array, ...]:
     """The scratch arrays of `rates_from_jumps`."""
     own = (np.zeros(n), np.zeros((n, n)), np.zeros((n, parameters)), np.zeros((n, n)), np.zeros((n, 1)))
-    return (*own, *(np.zeros((2 * n, 2 * n)) for _ in range(4)))
+    return (*own, *(np.zeros((2 * n, 2 * n)) for _ in range(6)))
 
 
 @compile_kernel(nb.types.boolean(nb.MATRIX, nb.REAL, nb.VECTOR, nb.VECTOR, nb.VECTOR, nb.MATRIX))
@@ -79,7 +79,7 @@ def rates_from_jumps(rate: Any, t: Any, u: Any, p: Any, on: Any, X: Any, jumps: 
     F is the model's Jacobian at the filtered state X (N, n) ahead of the step. Writes D (N, n), 0 at the first
     sample, whose jump corrects the initial state, and the work arrays.
     """
-    f, Fx, Fp, G, d, A, E, T1, T2 = work
+    f, Fx, Fp, G, d, A, E, A2, A3, A4, T = work
     n = X.shape[1]
     for i in range(n):
         D[0, i] = 0.0
@@ -95,7 +95,7 @@ def rates_from_jumps(rate: Any, t: Any, u: Any, p: Any, on: Any, X: Any, jumps: 
                 A[i, n + j] = dt if i == j else 0.0
                 A[n + i, j] = 0.0
                 A[n + i, n + j] = 0.0
-        exponential(A, E, T1, T2)
+        exponential(A, E, A2, A3, A4, T)
         for i in range(n):
             d[i, 0] = jumps[k, i]
             for j in range(n):
