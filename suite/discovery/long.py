@@ -19,6 +19,7 @@ Array = npt.NDArray[np.float64]
 LONG = 4096  # samples from which a record is searched in a block of it
 BLOCK = 2000  # samples of that block
 FEWEST = 10  # samples of a run in it
+WORSE = 4.0  # times the block's mean squared error: what a fit of the whole record has lost its way at
 FINALISTS = 2  # effects that are fitted to the whole record, and the best combination where it is worth it
 
 
@@ -69,8 +70,21 @@ def _block(problem: Problem, base: Hypothesis) -> Problem:
 
 
 def _whole(problem: Problem, base: Hypothesis, hypothesis: Hypothesis) -> Hypothesis:
-    """A hypothesis of the block, fitted to the whole record from what it found there."""
-    point = Point(base.exact.point.x0 if base.exact.passed.finite else base.best.point.x0, hypothesis.exact.point.p)
+    """A hypothesis of the block, fitted to the whole record from what it found there.
+
+    Where the base model's exact fit ended far from the data, as that of a chaotic plant does, its first states lead
+    nowhere: then from the states of its most likely level, and over all levels below that.
+    """
+    exact = base.exact if base.exact.passed.finite else base.best
+    fitted = _from(problem, exact.point.x0, hypothesis, LEVELS[-2])
+    if left(fitted) > WORSE * left(hypothesis) and exact is not base.best:
+        again = _from(problem, base.best.point.x0, hypothesis, base.best.q)
+        fitted = min(fitted, again, key=left)
+    return fitted
+
+
+def _from(problem: Problem, x0: Array, hypothesis: Hypothesis, first: float) -> Hypothesis:
+    point = Point(x0, hypothesis.exact.point.p)
     for k in hypothesis.active:
         point = brought(problem, point, k)
-    return homotopy(problem, point, hypothesis.active, first=LEVELS[-2], tolerance=1.0)
+    return homotopy(problem, point, hypothesis.active, first=first, tolerance=1.0)

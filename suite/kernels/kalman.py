@@ -15,6 +15,7 @@ import numpy.typing as npt
 from suite.kernels import types as nb
 from suite.kernels.cache import compile_kernel
 from suite.kernels.integrate import WORK, advance
+from suite.kernels.matrix import multiply, transpose
 
 Array = npt.NDArray[np.float64]
 
@@ -26,6 +27,18 @@ def ekf_workspace(n: int, parameters: int, outputs: int) -> tuple[Array, ...]:
     """The scratch arrays of `ekf`."""
     squares = (np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n)))
     return (np.zeros((outputs, parameters)), np.zeros(n), np.zeros(n), *squares, np.zeros(outputs))
+
+
+@compile_kernel(nb.types.void(nb.MATRIX, nb.MATRIX, nb.MATRIX, nb.MATRIX, nb.MATRIX))
+def turned(T: Any, S: Any, M: Any, W: Any, out: Any) -> None:
+    """Symmetric T S T' of a symmetric S, as T (T S)'. Writes out, which may be S, and M, W."""
+    multiply(T, S, M)
+    transpose(M, W)
+    multiply(T, W, M)
+    for i in range(T.shape[0]):
+        for j in range(i + 1):
+            out[i, j] = M[i, j]
+            out[j, i] = M[i, j]
 
 
 @compile_kernel(
@@ -71,32 +84,18 @@ def ekf(
                 for j in range(n):
                     base[i] += T[i, j] * x[j]
                     Phi[k, i, j] = T[i, j]
-                    total = 0.0
-                    noise = 0.0
-                    for l in range(n):
-                        total += T[i, l] * C[l, j]
-                        noise += T[i, l] * Q[l, j]
-                    C2[i, j] = total
-                    Qd[k, i, j] = noise
+                    Qd[k, i, j] = dt * Q[i, j]
             for i in range(n):
                 x[i] = base[i]
-                for j in range(i + 1):
-                    total = 0.0
-                    noise = 0.0
-                    for l in range(n):
-                        total += C2[i, l] * T[j, l]
-                        noise += Qd[k, i, l] * T[j, l]
-                    # The upper triangle is kept for the rows below, which still read it.
-                    C[i, j] = 0.5 * dt * (noise + Q[i, j]) if spread != 0 else dt * Q[i, j]
-                    Pp[k, i, j] = total + C[i, j]
-            for i in range(n):
-                for j in range(i + 1):
-                    Qd[k, i, j] = C[i, j]
-                    Qd[k, j, i] = C[i, j]
-                    Pp[k, j, i] = Pp[k, i, j]
+            if spread != 0:
+                turned(T, Q, C2, P[k], Qd[k])
+                for i in range(n):
+                    for j in range(n):
+                        Qd[k, i, j] = 0.5 * dt * (Qd[k, i, j] + Q[i, j])
+            turned(T, C, C2, P[k], Pp[k])
             for i in range(n):
                 for j in range(n):
-                    C[i, j] = Pp[k, i, j]
+                    C[i, j] = Pp[k, i, j] + Qd[k, i, j]
         for i in range(n):
             Xp[k, i] = x[i]
             for j in range(n):

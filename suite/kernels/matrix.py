@@ -58,15 +58,29 @@ def solve(A: Any, B: Any) -> int:
 
 @compile_kernel(nb.types.void(nb.MATRIX, nb.MATRIX, nb.MATRIX))
 def multiply(A: Any, B: Any, C: Any) -> None:
-    """C = A B, row by row of B, so that the inner loop runs along memory. Writes C, which is neither A nor B."""
+    """C = A B, four rows of B at a time, so that the inner loop runs along memory. Writes C, which is neither A nor B."""
+    inner = B.shape[0]
+    width = B.shape[1]
+    whole = inner - inner % 4
     for i in range(A.shape[0]):
-        for j in range(B.shape[1]):
+        for j in range(width):
             C[i, j] = 0.0
-        for l in range(B.shape[0]):
-            a = A[i, l]
-            if a != 0.0:
-                for j in range(B.shape[1]):
-                    C[i, j] += a * B[l, j]
+        for l in range(0, whole, 4):
+            a0, a1, a2, a3 = A[i, l], A[i, l + 1], A[i, l + 2], A[i, l + 3]
+            if a0 != 0.0 or a1 != 0.0 or a2 != 0.0 or a3 != 0.0:
+                for j in range(width):
+                    C[i, j] += a0 * B[l, j] + a1 * B[l + 1, j] + a2 * B[l + 2, j] + a3 * B[l + 3, j]
+        for l in range(whole, inner):
+            for j in range(width):
+                C[i, j] += A[i, l] * B[l, j]
+
+
+@compile_kernel(nb.types.void(nb.MATRIX, nb.MATRIX))
+def transpose(A: Any, T: Any) -> None:
+    """T = A'. Writes T, which is not A."""
+    for i in range(A.shape[0]):
+        for j in range(A.shape[1]):
+            T[j, i] = A[i, j]
 
 
 @compile_kernel(nb.REAL(nb.MATRIX, nb.MATRIX, nb.MATRIX, nb.MATRIX))

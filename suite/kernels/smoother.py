@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from suite.kernels import types as nb
 from suite.kernels.cache import compile_kernel
+from suite.kernels.matrix import multiply, transpose
 
 Array = npt.NDArray[np.float64]
 
@@ -49,40 +50,25 @@ def adjoint(
     N, n = X.shape
     for k in range(N - 1, -1, -1):
         for i in range(n):
-            total = 0.0
+            v[i] = 0.0
             if k < N - 1:
                 for j in range(n):
-                    total += Phi[k + 1, j, i] * before[k + 1, j]
-            after[k, i] = total
-            v[i] = total
-            for j in range(n):
-                part = 0.0
-                if k < N - 1:
-                    for l in range(n):
-                        part += Before[k + 1, i, l] * Phi[k + 1, l, j]
-                A[i, j] = part
+                    v[i] += Phi[k + 1, j, i] * before[k + 1, j]
+            after[k, i] = v[i]
+        if k < N - 1:
+            # Lambda <- Phi' (Lambda Phi)
+            multiply(Before[k + 1], Phi[k + 1], A)
+            transpose(Phi[k + 1], B)
+            multiply(B, A, After[k])
+        else:
+            After[k] = 0.0
+        multiply(After[k], P[k], A)
+        multiply(P[k], A, B)
         for i in range(n):
+            Xs[k, i] = X[k, i]
             for j in range(n):
-                part = 0.0
-                if k < N - 1:
-                    for l in range(n):
-                        part += Phi[k + 1, l, i] * A[l, j]
-                After[k, i, j] = part
-        for i in range(n):
-            total = X[k, i]
-            for j in range(n):
-                total += P[k, i, j] * v[j]
-                part = 0.0
-                for l in range(n):
-                    part += After[k, i, l] * P[k, l, j]
-                A[i, j] = part
-            Xs[k, i] = total
-        for i in range(n):
-            for j in range(n):
-                part = P[k, i, j]
-                for l in range(n):
-                    part -= P[k, i, l] * A[l, j]
-                Ps[k, i, j] = part
+                Xs[k, i] += P[k, i, j] * v[j]
+                Ps[k, i, j] = P[k, i, j] - B[i, j]
         for i in range(n):
             for j in range(n):
                 B[i, j] = After[k, i, j]
