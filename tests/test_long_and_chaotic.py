@@ -4,8 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+import pytest
+
 from suite import plugins
 from suite.case import Case
+from suite.discovery import long
+from suite.discovery import verdict as verdicts
+from suite.discovery.fit import prepare
 from suite.discovery.verdict import diagnose, investigate, judge
 
 EFFECTS = plugins.effects()
@@ -52,3 +58,29 @@ def test_two_effects_that_look_like_a_third_are_found() -> None:
     assert set(found) == set(true)
     for name, value in true.items():
         assert abs(found[name].value - value) < 3.0 * found[name].sd
+
+
+def test_the_normal_equations_of_runs_with_their_own_first_states_are_those_of_the_whole_jacobian() -> None:
+    case = lasting("null-lorenz", 15.0)
+    problem = prepare(case.deficient, case.simulate(0.01, 1)[0])
+    layout = problem.layout(())
+    passed = problem.run(problem.start, 1.0, layout)
+    A, g = problem.normal(passed, len(layout.columns))
+    assert len(problem.record.starts) > 2
+    np.testing.assert_allclose(A, passed.J.T @ passed.J, rtol=1e-10, atol=1e-8 * np.abs(A).max())
+    np.testing.assert_allclose(g, passed.J.T @ passed.e, rtol=1e-10, atol=1e-8 * np.abs(g).max())
+
+
+def test_a_small_term_of_a_long_chaotic_record_is_found_though_no_exact_fit_without_it_comes_near(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Lorenz-63 with a hidden 0.01 x^3: searched in a block, then fitted to all stretches of the record."""
+    monkeypatch.setattr(long, "LONG", 1400)
+    monkeypatch.setattr(verdicts, "LONG", 1400)
+    monkeypatch.setattr(long, "BLOCK", 700)
+    case = lasting("lorenz-hidden-cubic", 40.0)
+    effects = {name: EFFECTS[name] for name in ("cubic_term", "absolute_term", "quadratic_term")}
+    verdict = diagnose(case.deficient, case.simulate(0.01, 0)[0], effects)
+    assert [(e.effect, e.equation) for e in verdict.effects] == [("cubic_term", "x")]
+    a = verdict.effects[0].coefficients["a"]
+    assert abs(a.value + 0.01) < 4.0 * a.sd < 0.001

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -109,6 +110,27 @@ class Problem(Frame):
             wide[rows, :, r * len(free) : (r + 1) * len(free)] = J[rows][:, :, free]
         wide[:, :, runs * len(free) :] = J[:, :, n:]
         return wide[self.seen]
+
+    def normal(self, passed: Pass, parameters: int) -> tuple[Array, Array]:
+        """J'J and J'e of a pass whose last `parameters` columns are the layout's; a run's first states meet only the
+        rows of that run.
+        """
+        J, e = passed.J, passed.e
+        edge, runs = J.shape[1] - parameters, len(self.record.starts)
+        if runs == 1 or edge == 0:
+            return J.T @ J, J.T @ e
+        A = np.zeros((J.shape[1], J.shape[1]))
+        rows = np.concatenate([[0], np.cumsum(self.seen.sum(axis=1))])[self.record.bounds]
+        free, shared = edge // runs, slice(edge, None)
+        for r, (first, last) in enumerate(pairwise(rows)):
+            own = slice(r * free, (r + 1) * free)
+            mine, common = np.ascontiguousarray(J[first:last, own]), J[first:last, shared]
+            A[own, own] = mine.T @ mine
+            A[own, shared] = mine.T @ common
+            A[shared, own] = A[own, shared].T
+        common = np.ascontiguousarray(J[:, shared])
+        A[shared, shared] = common.T @ common
+        return A, J.T @ e
 
     def cost(self, passed: Pass, point: Point, layout: Layout) -> float:
         """L of a pass: n ln(mean e^2) + sum ln s + prior."""

@@ -91,8 +91,7 @@ def levenberg_marquardt(
             break
         noise = problem.noise(passed)
         pulls = np.where(known, 1.0 / np.where(known, sd[columns], 1.0), 0.0)
-        A = passed.J.T @ passed.J / noise
-        g = passed.J.T @ passed.e / noise
+        A, g = (part / noise for part in problem.normal(passed, len(columns)))
         inner = slice(edge, None)
         A[inner, inner] += np.diag(pulls**2)
         g[inner] += pulls**2 * (point.p[columns] - mean[columns])
@@ -139,9 +138,10 @@ def homotopy(
     first: float = LEVELS[0],
     tolerance: float = 0.05,
     rounds: int = 8,
+    risen: float = RISEN,
 ) -> Hypothesis:
     """Fit at every level from `first` down to 0, each started where the last ended; the last one converged, those on
-    the way in at most so many rounds.
+    the way in at most so many rounds. Where a level lies `risen` above the best, the next one is 0.
     """
     levels: list[Level] = []
     lowest = np.inf
@@ -149,7 +149,7 @@ def homotopy(
     finest = 1e-3 * max(1.0, problem.count / 1000.0)
     for q in (level for level in LEVELS if level <= first):
         last = q == 0.0
-        if not last and levels and lowest + RISEN < levels[-1].L:
+        if not last and levels and lowest + risen < levels[-1].L:
             continue
         level = levenberg_marquardt(problem, point, q, active, 30 if last else rounds, finest if last else tolerance)
         lowest = min(lowest, level.L)
@@ -173,7 +173,7 @@ def covariance(problem: Problem, level: Level, columns: Index) -> Array:
     noise = problem.noise(level.passed)
     sd = problem.prior[1][columns]
     pulls = np.where(np.isfinite(sd), 1.0 / np.where(np.isfinite(sd), sd, 1.0) ** 2, 0.0)
-    A = level.passed.J.T @ level.passed.J / noise
+    A = problem.normal(level.passed, len(columns))[0] / noise
     if not np.isfinite(A).all():
         return np.full(A.shape, 1e300)
     edge = A.shape[0] - len(columns)

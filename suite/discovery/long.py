@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from suite.discovery.engine import Problem
-from suite.discovery.fit import LEVELS, Hypothesis, homotopy
+from suite.discovery.fit import LEVELS, RISEN, Hypothesis, homotopy
 from suite.discovery.frame import Point
 from suite.discovery.identify import WORTH, Search, left, search
 from suite.discovery.patchwork import hollow, patched
@@ -76,15 +76,16 @@ def _whole(problem: Problem, base: Hypothesis, hypothesis: Hypothesis) -> Hypoth
     nowhere: then from the states of its most likely level, and over all levels below that.
     """
     exact = base.exact if base.exact.passed.finite else base.best
-    fitted = _from(problem, exact.point.x0, hypothesis, LEVELS[-2])
+    fitted = _from(problem, exact.point.x0, hypothesis, LEVELS[-2], RISEN)
     if left(fitted) > WORSE * left(hypothesis) and exact is not base.best:
-        again = _from(problem, base.best.point.x0, hypothesis, base.best.q)
+        # The block has shown what it is worth: no rise on the way ends the walk.
+        again = _from(problem, base.best.point.x0, hypothesis, base.best.q, np.inf)
         fitted = min(fitted, again, key=left)
     return fitted
 
 
-def _from(problem: Problem, x0: Array, hypothesis: Hypothesis, first: float) -> Hypothesis:
+def _from(problem: Problem, x0: Array, hypothesis: Hypothesis, first: float, risen: float) -> Hypothesis:
     point = Point(x0, hypothesis.exact.point.p)
     for k in hypothesis.active:
         point = brought(problem, point, k)
-    return homotopy(problem, point, hypothesis.active, first=first, tolerance=1.0)
+    return homotopy(problem, point, hypothesis.active, first=first, tolerance=1.0, risen=risen)

@@ -58,7 +58,7 @@ def solve(A: Any, B: Any) -> int:
 
 @compile_kernel(nb.types.void(nb.MATRIX, nb.MATRIX, nb.MATRIX))
 def multiply(A: Any, B: Any, C: Any) -> None:
-    """C = A B, four rows of B at a time, so that the inner loop runs along memory. Writes C, which is neither A nor B."""
+    """C = A B, four rows of B at a time: the inner loop runs along memory. Writes C, which is neither A nor B."""
     inner = B.shape[0]
     width = B.shape[1]
     whole = inner - inner % 4
