@@ -27,5 +27,7 @@ CASE = Case(
     truth=PLANT,
     experiment=Experiment(50.0, 0.01, (-8.0, 8.0, 27.0)),
     missing=(Missing("cubic_term", "x", {"a": -0.01}),),
+    # Standard deviations of 0 (here: of rounding), 0.001, 0.01 and 0.1 on states whose own are 8.5 to 9.
+    noises=(1e-6, 1.1e-4, 1.1e-3, 1.1e-2),
     tags=("chaotic", "published"),
 )

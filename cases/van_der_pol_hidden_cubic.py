@@ -20,5 +20,7 @@ CASE = Case(
     truth=PLANT,
     experiment=EXPERIMENT,
     missing=(Missing("cubic_stiffness", "v", {"a": -0.01}),),
+    # Standard deviations of 0 (here: of rounding), 0.001, 0.01 and 0.1 on states whose own are 1.4.
+    noises=(1e-6, 7e-4, 7e-3, 7e-2),
     tags=("mechanical", "published"),
 )

@@ -20,5 +20,6 @@ CASE = Case(
     truth=PLANT,
     experiment=EXPERIMENT,
     missing=(Missing("nonlinear_damping", "y", {"mu": 4.0}),),
+    noises=(0.01, 0.1, 0.2, 0.4),
     tags=("mechanical", "published", "outside"),
 )
