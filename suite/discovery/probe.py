@@ -19,7 +19,7 @@ from suite.discovery.fit import Hypothesis
 from suite.discovery.frame import Point
 from suite.discovery.scoring import projected
 from suite.discovery.terms import Term
-from suite.effect import Effect
+from suite.effect import Effect, Inner
 
 Array = npt.NDArray[np.float64]
 
@@ -32,17 +32,19 @@ def hidden_law(problem: Problem, hypothesis: Hypothesis) -> tuple[str, str] | No
     """(equation, state) of the law that the error still follows most clearly, or None where it follows none."""
     if not hypothesis.exact.passed.finite:
         return None
-    hats = {pair: list(_hats(problem, *pair)) for pair in _pairs(problem)}
-    hats = {pair: terms for pair, terms in hats.items() if terms}
+    spans = {pair: _span(problem, pair[1]) for pair in _pairs(problem)}
+    hats = {pair: span for pair, span in spans.items() if span[1] > 0}
     if not hats:
         return None
     active = tuple(problem.terms[k] for k in hypothesis.active)
-    wide = problem.with_terms((*active, *(term for terms in hats.values() for term in terms)))
+    wide = problem.with_terms((*active, *(hat for pair in hats for hat in [_hat(*pair)] * HATS)))
     point = _moved(problem, hypothesis, wide)
     first, smallest, found = len(active), 1.0, None
-    for pair, terms in hats.items():
-        also = list(range(first, first + len(terms)))
-        first += len(terms)
+    for pair, (low, width) in hats.items():
+        also = list(range(first, first + HATS))
+        first += HATS
+        for i, k in enumerate(also):
+            point.p[wide.places(k)[1:]] = low + i * width, width
         p = _chance(wide, point, tuple(range(len(active))), also)
         if p < smallest:
             smallest, found = p, pair
@@ -58,18 +60,18 @@ def _pairs(problem: Problem) -> Iterator[tuple[str, str]]:
             yield equation, state
 
 
-def _hats(problem: Problem, equation: str, state: str) -> Iterator[Term]:
-    """Hats of equal width over the middle 98 % of the visited range."""
-    model = problem.model
-    x = problem.path[:, list(model.states).index(state)]
+def _span(problem: Problem, state: str) -> tuple[float, float]:
+    """Where the first hat stands and how wide each is: they cover the middle 98 % of the visited range."""
+    x = problem.path[:, list(problem.model.states).index(state)]
     low, high = np.quantile(x, [0.01, 0.99])
-    width = (high - low) / (HATS - 1)
-    if not width > 0:
-        return
-    for i, centre in enumerate(np.linspace(low, high, HATS)):
-        text = f"+a*max(0, 1 - abs({state} - ({float(centre)!r}))/{float(width)!r})"
-        effect = Effect(f"hat{i}", text, {}, "A hat.", "rate")
-        yield Term(effect, equation, text, ("a",), {}, state)
+    return float(low), float(high - low) / (HATS - 1)
+
+
+def _hat(equation: str, state: str) -> Term:
+    """A hat; where it stands and how wide it is are numbers beside the text, so that it is compiled once for all."""
+    text = f"+a*max(0, 1 - abs({state} - centre)/width)"
+    inner = {"centre": Inner("range", 0.5, 0.0, 1.0), "width": Inner("spread", 0.5, 0.0, 1.0)}
+    return Term(Effect("hat", text, {}, "A hat.", "rate"), equation, text, ("a",), inner, state)
 
 
 def _moved(problem: Problem, hypothesis: Hypothesis, wide: Problem) -> Point:
