@@ -9,7 +9,7 @@ import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
-from suite import __version__, bench_verbs
+from suite import __version__, bench_verbs, fleet_verb
 from suite.errors import InputError
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
@@ -55,7 +55,10 @@ def parser() -> argparse.ArgumentParser:
         "compare", parents=[inputs, as_json], help="simulate: fit, error against noise, where it fails"
     )
     verb.add_argument("--refit", action="store_true", help="fit the parameters first")
-    verbs.add_parser("diagnose", parents=[inputs, search, as_json], help="ranked missing effects and the verdict")
+    verb = verbs.add_parser(
+        "diagnose", parents=[inputs, search, as_json], help="ranked missing effects and the verdict; --each: of a fleet"
+    )
+    fleet_verb.add_arguments(verb)
     verb = verbs.add_parser("add", parents=[as_json], help="write the model with an effect added")
     verb.add_argument("model", type=Path, metavar="MODEL", help="model file (TOML)")
     verb.add_argument("effect", metavar="EFFECT", help="an effect of `unmodelled list`")
@@ -106,6 +109,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         if args.verb == "bench":
             return bench_verbs.run(args)
+        if args.verb == "diagnose" and fleet_verb.asked(args):
+            return fleet_verb.run(args)
         if args.verb == "watch":
             from suite import watch_verb
 

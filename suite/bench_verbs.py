@@ -24,12 +24,12 @@ def add_parser(subparsers: Any) -> None:
     plan.add_argument(
         "--estimators", nargs="+", metavar="NAME", help="instead of the plan's; a grid: 'ekf[q_scale=0.1,1,10]'"
     )
-    plan.add_argument("--seeds", type=_count, metavar="N", help="seeds instead of the plan's")
+    plan.add_argument("--seeds", type=count, metavar="N", help="seeds instead of the plan's")
     plan.add_argument("--data", type=Path, metavar="DIR", help="folder of measured data that are not shipped")
     work = argparse.ArgumentParser(add_help=False)
-    work.add_argument("--jobs", type=_count, metavar="N", help="processes, default one a core")
+    work.add_argument("--jobs", type=count, metavar="N", help="processes, default one a core")
     work.add_argument("--force", action="store_true", help="run again what is stored and unchanged")
-    work.add_argument("--memory", type=_count, metavar="MIB", help="memory of one cell at most, default the plan's")
+    work.add_argument("--memory", type=count, metavar="MIB", help="memory of one cell at most, default the plan's")
     work.add_argument("--dask", metavar="ADDRESS", help="run on the Dask cluster whose scheduler is there")
     out = argparse.ArgumentParser(add_help=False)
     out.add_argument("-o", "--output", type=Path, metavar="DIR", required=True, help="folder to write to")
@@ -63,14 +63,15 @@ def add_parser(subparsers: Any) -> None:
     claims.add_argument("--brief", action="store_true", help="the ledger alone, without what the source leaves open")
     twins = verbs.add_parser("twin", parents=[as_json], help="the long twin experiments with published errors")
     twins.add_argument("-o", "--output", type=Path, metavar="FILE", required=True, help="JSON file to write")
-    twins.add_argument("--seeds", type=_count, default=20, metavar="N", help="runs of each method, default 20")
+    twins.add_argument("--seeds", type=count, default=20, metavar="N", help="runs of each method, default 20")
     cost = verbs.add_parser("cost", parents=[out, as_json], help="run time a step against states and record length")
     cost.add_argument("--estimators", nargs="+", metavar="NAME", help="these alone, default all")
     one = verbs.add_parser("table1", parents=[out, as_json], help="the sources' Table 1 and what better methods reach")
-    one.add_argument("--seeds", type=_count, default=5, metavar="N", help="seeds of the comparison, default 5")
+    one.add_argument("--seeds", type=count, default=5, metavar="N", help="seeds of the comparison, default 5")
 
 
-def _count(text: str) -> int:
+def count(text: str) -> int:
+    """A number of a command line, from 1."""
     value = int(text)
     if value < 1:
         raise argparse.ArgumentTypeError(f"{text}: expected a number above zero")

@@ -87,7 +87,7 @@ def run(cell: Cell, tuned: Mapping[str, float], data: Path | None) -> dict[str, 
         except Exception as error:  # an estimator may fail in any way; the failure is its result
             kind = {"kind": "reference"} if reference else {}
             return {**row, **kind, "status": "error", "reason": f"{type(error).__name__}: {error}"}
-    cost = {"seconds": seconds, "step_us": 1e6 * seconds / len(record), "steps": len(record), "peak_mb": _peak()}
+    cost = {"seconds": seconds, "step_us": 1e6 * seconds / len(record), "steps": len(record), "peak_mb": peak()}
     return {**row, **cost, **judged}
 
 
@@ -105,7 +105,7 @@ def _warm_up(case: Case, estimator: Estimator, record: Record) -> None:
         return
 
 
-def _peak() -> float:
+def peak() -> float:
     """The process's largest resident memory so far, in MB; NaN where the system does not say."""
     try:
         import resource

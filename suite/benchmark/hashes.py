@@ -45,12 +45,17 @@ JUDGING = ("recovery.py", "verdicts.py", "conditions.py", "columns.py")
 RIVAL = ("rivals.py", "sparse.py", "better.py")
 
 
+def finding() -> list[Path]:
+    """The files of discovery, its kernels and the library of effects."""
+    root = Path(suite.__file__).parent.parent
+    parts = [[root / part] if part.endswith(".py") else (root / part).glob("*.py") for part in FINDING]
+    return [path for part in parts for path in part]
+
+
 def method(name: str) -> str:
     """A hash of the source of a method of the recovery benchmark, of its judge and of the library of effects."""
-    root, here = Path(suite.__file__).parent.parent, Path(__file__).parent
-    paths = [
-        path for part in FINDING for path in ([root / part] if part.endswith(".py") else (root / part).glob("*.py"))
-    ]
+    here = Path(__file__).parent
+    paths = finding()
     paths += [here / file for file in (*JUDGING, *(() if name == OURS else RIVAL))]
     texts = sorted((path.name, path.read_text(encoding="utf-8")) for path in paths)
     versions = [version("pysindy")] if "pysindy" in name and find_spec("pysindy") else []

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import fnmatch
-import os
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
@@ -19,16 +18,16 @@ import numpy as np
 
 import suite
 from suite import plugins
-from suite.benchmark import cluster, grids, pool, tuning
+from suite.benchmark import grids, tuning
 from suite.benchmark.cells import Cell
+from suite.benchmark.driving import Driving, drive
 from suite.benchmark.hashes import Keys
 from suite.benchmark.plan import Plan
-from suite.benchmark.progress import Progress
 from suite.benchmark.recovery import recovers
 from suite.benchmark.references import VARIANT
-from suite.benchmark.reservations import Reservations, offered
+from suite.benchmark.reservations import Reservations
 from suite.benchmark.store import Store
-from suite.benchmark.worker import MEMORY, Failure, Task
+from suite.benchmark.worker import Failure, Task
 from suite.errors import DataError, InputError
 
 
@@ -66,26 +65,12 @@ def _runs(data: Path | None) -> dict[str, int]:
 
 
 @dataclass(frozen=True)
-class Running:
-    """How cells are run: `jobs` processes here or the Dask cluster at an address; `limit` in seconds and `memory` in
-    MiB are of one cell; `force` runs again what is stored; `tuned_at` and `tuned_as` as in a plan.
-    """
+class Running(Driving):
+    """How cells are run; `tuned_at` and `tuned_as` as in a plan."""
 
-    jobs: int | None = None
-    limit: float = 60.0
-    memory: float = MEMORY
     data: Path | None = None
-    force: bool = False
-    quiet: bool = False
-    dask: str | None = None
     tuned_at: float | None = None
     tuned_as: Mapping[str, str] = field(default_factory=dict)
-
-    def results(self, tasks: Iterator[Task | None], limit: float) -> Iterator[tuple[Task, Any]]:
-        """Each task with its result or Failure, as they finish."""
-        if self.dask is None:
-            return pool.run(tasks, self.jobs or max(1, os.cpu_count() or 1), limit, self.memory)
-        return cluster.run(tasks, self.dask, limit, self.memory)
 
 
 def run(cells: Sequence[Cell], store: Store, how: Running, *, tune_only: bool = False) -> dict[str, Any]:
@@ -110,24 +95,23 @@ def run(cells: Sequence[Cell], store: Store, how: Running, *, tune_only: bool = 
             module = "recovery" if recovers(cell) else "cells"
             return Task(f"suite.benchmark.{module}:run", (cell, values, how.data), cell)
 
-        work = ((keys.cell(cell), partial(task, cell)) for cell in fresh)
         statuses: Counter[str] = Counter()
         versions = _versions()
-        with Progress("cells", len(fresh), quiet=how.quiet) as progress:
-            for done, outcome in how.results(offered(work, held), how.limit):
-                cell, row = done.label, outcome
-                if isinstance(outcome, Failure):
-                    row = {"status": outcome.status, "reason": outcome.reason}
-                    kind = "recovery" if recovers(cell) else cell.variant
-                    row |= {"kind": kind} if kind in ("recovery", VARIANT) else {}
-                if cell.variant == "tuned" and keys.tuner(cell.estimator) != cell.estimator:
-                    row["tuned_as"] = keys.tuner(cell.estimator)
-                hashes = {"plugin_hash": keys.plugin(cell.estimator), "case_hash": keys.case(cell.case)}
-                with store.transaction():
-                    store.put(cell, keys.cell(cell), {**row, **hashes, "versions": versions})
-                    held.give_back(keys.cell(cell))
-                statuses[row["status"]] += 1
-                progress.step(cell.label)
+
+        def keep(done: Task, outcome: Any) -> tuple[str, str]:
+            cell, row = done.label, outcome
+            if isinstance(outcome, Failure):
+                row = {"status": outcome.status, "reason": outcome.reason}
+                kind = "recovery" if recovers(cell) else cell.variant
+                row |= {"kind": kind} if kind in ("recovery", VARIANT) else {}
+            if cell.variant == "tuned" and keys.tuner(cell.estimator) != cell.estimator:
+                row["tuned_as"] = keys.tuner(cell.estimator)
+            hashes = {"plugin_hash": keys.plugin(cell.estimator), "case_hash": keys.case(cell.case)}
+            store.put(cell, keys.cell(cell), {**row, **hashes, "versions": versions})
+            statuses[row["status"]] += 1
+            return keys.cell(cell), cell.label
+
+        drive("cells", [(keys.cell(cell), partial(task, cell)) for cell in fresh], held, how, keep)
     count = statuses.total()
     return {"cells": len(cells), "run": count, "unchanged": len(cells) - count, "status": dict(statuses)}
 
@@ -145,20 +129,18 @@ def _tune(cells: Sequence[Cell], store: Store, keys: Keys, how: Running, held: R
             return None
         return Task("suite.benchmark.tuning:tune", (*entry, how.data), key)
 
-    work = ((key, partial(task, key, entry)) for key, entry in fresh.items())
+    def keep(done: Task, outcome: Any) -> tuple[str, str]:
+        case, noise, name = fresh[done.label]
+        if isinstance(outcome, Failure):
+            outcome = {
+                "values": {}, "failure": outcome.reason, "case": case, "noise": noise, "estimator": name
+            }  # fmt: skip
+        store.put_tuning(done.label, outcome)
+        return done.label, f"{case} {name}"
+
     # Several estimates a score make a tuning long; it gets the time of as many cells.
     limit = how.limit * len(tuning.SEEDS) * tuning.EVALUATIONS
-    with Progress("tunings", len(fresh), quiet=how.quiet) as progress:
-        for done, outcome in how.results(offered(work, held), limit):
-            case, noise, name = fresh[done.label]
-            if isinstance(outcome, Failure):
-                outcome = {
-                    "values": {}, "failure": outcome.reason, "case": case, "noise": noise, "estimator": name
-                }  # fmt: skip
-            with store.transaction():
-                store.put_tuning(done.label, outcome)
-                held.give_back(done.label)
-            progress.step(f"{case} {name}")
+    drive("tunings", [(key, partial(task, key, entry)) for key, entry in fresh.items()], held, how, keep, limit)
     return len(by_key)
 
 

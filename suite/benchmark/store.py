@@ -26,6 +26,8 @@ CREATE TABLE IF NOT EXISTS runs (run TEXT PRIMARY KEY, beat REAL NOT NULL);
 CREATE TABLE IF NOT EXISTS taken (key TEXT PRIMARY KEY, run TEXT NOT NULL);
 """
 CELL = '"case", noise, estimator, variant, seed'
+# How a user says where the store is, for the sentences that ask for another place.
+ELSEWHERE = "name another file with --store"
 
 
 class Store:
@@ -34,10 +36,10 @@ class Store:
     InputError where the file cannot be used or written: a full disk, a folder that cannot be written, another schema.
     """
 
-    def __init__(self, path: Path, *, must_exist: bool = False) -> None:
+    def __init__(self, path: Path, *, must_exist: bool = False, elsewhere: str = ELSEWHERE) -> None:
         if must_exist and not path.is_file():
             raise InputError(f"no results in {path}; make them with: unmodelled bench run --store {path}")
-        self.path = path
+        self.path, self.elsewhere = path, elsewhere
         with self._in_words():
             # A writer waits for its turn up to a minute.
             self.connection = sqlite3.connect(path, timeout=60.0, isolation_level=None)
@@ -49,7 +51,7 @@ class Store:
 
     def _open(self) -> None:
         """Refuse another layout before anything is written, then lay out what is not there."""
-        found = check_schema(self.connection, self.path)
+        found = check_schema(self.connection, self.path, self.elsewhere)
         # WAL: readers go on while another process writes.
         self.connection.execute("PRAGMA journal_mode=WAL")
         self.connection.execute("PRAGMA synchronous=NORMAL")
@@ -63,7 +65,7 @@ class Store:
         except sqlite3.Error as error:
             raise InputError(
                 f"{self.path}: cannot be used as a store of results ({error}); what it holds is kept: mend what is "
-                "wrong (space, permissions) or name another file with --store"
+                f"wrong (space, permissions) or {self.elsewhere}"
             ) from None
 
     def __enter__(self) -> Store:
@@ -122,15 +124,15 @@ class Store:
         self.execute("INSERT OR REPLACE INTO tunings VALUES (?,?,?)", (key, json.dumps(values), time.time()))
 
 
-def check_schema(connection: sqlite3.Connection, path: Path) -> int:
+def check_schema(connection: sqlite3.Connection, path: Path, elsewhere: str = ELSEWHERE) -> int:
     """The schema of a store that this version reads, 0 for a new file; InputError says what it is instead."""
     found = int(connection.execute("PRAGMA user_version").fetchone()[0])
     tables = {name for (name,) in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
     if found > SCHEMA:
         raise InputError(
             f"{path} is a store of schema {found}, this version reads up to {SCHEMA}; use a newer unmodelled for it, "
-            "or name another file with --store"
+            f"or {elsewhere}"
         )
     if tables and not {"cells", "tunings"} <= tables:
-        raise InputError(f"{path} is a database of something else; name another file with --store")
+        raise InputError(f"{path} is a database of something else; {elsewhere}")
     return found

@@ -11,6 +11,7 @@ from typing import Any
 
 from suite.benchmark.statistics import summarise
 from suite.errors import InputError
+from suite.files import write_whole, written_whole
 
 Row = Mapping[str, Any]
 
@@ -107,19 +108,19 @@ def flat(row: Row) -> dict[str, Any]:
 
 
 def write(rows: Sequence[Row], path: Path) -> None:
-    """Write rows by the ending of the path: .csv, .parquet or .json."""
+    """Write rows by the ending of the path, .csv, .parquet or .json; whole or not at all."""
     import pandas as pd
 
-    path.parent.mkdir(parents=True, exist_ok=True)
+    if path.suffix not in (".csv", ".parquet", ".json"):
+        raise InputError(f"{path}: a table is written as .csv, .parquet or .json; change the ending")
     if path.suffix == ".json":
-        path.write_text(to_json(list(rows)) + "\n", encoding="utf-8")
+        write_whole(path, to_json(list(rows)) + "\n")
         return
     frame = pd.DataFrame([flat(row) for row in rows])
-    if path.suffix == ".csv":
-        frame.to_csv(path, index=False)
-    elif path.suffix == ".parquet":
-        # A column that is a number here and a word there (a report's) is written as text.
-        words = [name for name in frame if frame[name].map(lambda value: isinstance(value, str)).any()]
-        frame.astype(dict.fromkeys(words, str)).to_parquet(path, index=False)
-    else:
-        raise InputError(f"{path}: a table is written as .csv, .parquet or .json; change the ending")
+    with written_whole(path) as beside:
+        if path.suffix == ".csv":
+            frame.to_csv(beside, index=False)
+        else:
+            # A column that is a number here and a word there (a report's) is written as text.
+            words = [name for name in frame if frame[name].map(lambda value: isinstance(value, str)).any()]
+            frame.astype(dict.fromkeys(words, str)).to_parquet(beside, index=False)
