@@ -281,3 +281,11 @@ def test_a_killed_recovery_run_resumes_and_is_shown(tmp_path: Path, capsys: pyte
 def _rows(path: Path) -> list[dict[str, Any]]:
     with Store(path) as store:
         return store.rows()
+
+
+def test_a_search_for_a_second_effect_has_a_time_of_its_own() -> None:
+    """Four verdicts of a second and one of nine that fitted pairs: both within what is wanted of them."""
+    rows = [*(made_up(seed=seed, depth=1) for seed in range(4)), made_up(seed=4, depth=2, cpu_seconds=9.0)]
+    one, two = figure(rows, "seconds"), figure(rows, "seconds, second")
+    assert (one["figure"], one["count"], one["reached"]) == (1.0, 4, True)
+    assert (two["figure"], two["count"], two["reached"]) == (9.0, 1, True)

@@ -48,6 +48,11 @@ class Trial:
     known: bool = True
 
     @property
+    def library(self) -> dict[str, Effect]:
+        """The effects that are searched: those of the library and the model's own, by id."""
+        return {effect.id: effect for effect in self.model.effects} | dict(self.effects)
+
+    @property
     def truth(self) -> frozenset[tuple[str, str]]:
         """What is missing, as (effect, equation)."""
         return frozenset((entry.effect, entry.equation) for entry in self.missing)
@@ -61,7 +66,8 @@ def inapplicable(case: Case, condition: str, effects: Mapping[str, Effect]) -> s
         return None
     if not case.missing:
         return "nothing is missing in it"
-    if condition != "outside" and not {entry.effect for entry in case.missing} <= set(effects):
+    held = {*effects, *(effect.id for effect in case.deficient.effects)}
+    if condition != "outside" and not {entry.effect for entry in case.missing} <= held:
         return "the library does not hold what is missing in it"
     return None
 
@@ -87,6 +93,7 @@ def trial(case: Case, condition: str, noise: float, seed: int, effects: Mapping[
         gone |= {name for name, effect in effects.items() if effect.generic and effect.inner}
         gone |= columns.look_alikes(case.deficient, effects, case.missing, record, truth.x)
         effects = {name: effect for name, effect in effects.items() if name not in gone}
+        model = replace(model, effects=tuple(effect for effect in model.effects if effect.id not in gone))
     return Trial(model, record, effects, clean, sigma, case.missing, known)
 
 

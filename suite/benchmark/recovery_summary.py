@@ -58,8 +58,9 @@ def targets(rows: Sequence[Row]) -> list[dict[str, Any]]:
     left = np.array([row["residual"] for row in stated if row.get("residual") is not None])
     quick = [row for row in plain if row.get("candidates", 99) <= FEW and row.get("samples", 9999) <= SHORT]
     # Processor time: other cells run beside this one. A search for a second effect has a demand of its own.
-    single = [row for row in quick if row["variant"] != "outside" and row not in pairs]
-    seconds = np.array([row["cpu_seconds"] for row in single if row.get("cpu_seconds") is not None])
+    timed = [row for row in quick if row.get("cpu_seconds") is not None]
+    one = np.array([row["cpu_seconds"] for row in timed if not sought(row)])
+    two = np.array([row["cpu_seconds"] for row in timed if sought(row)])
     inside = [row for row in sure if row["variant"] != "outside"]
     far = [row for row in sure if row["variant"] == "outside" and _value(row, "delta2") >= SEPARABLE]
     plain_to_see = [row for row in outside if visible(row)]
@@ -86,7 +87,8 @@ def targets(rows: Sequence[Row]) -> list[dict[str, Any]]:
         _figure("residual", "residual / sigma with the named effect, median", left, _median, "0.95 to 1.05"),
         _share("white", "residual white (Ljung-Box p >= 0.01)", stated, white, ">= 0.95"),
         _share("pairs", "two effects exact, where delta^2 >= 16", told, "exact_merged", ">= 0.8"),
-        _figure("seconds", "processor seconds a verdict, 95 of 100 within", seconds, _most, "<= 2"),
+        _figure("seconds", "processor seconds a verdict, 95 of 100 within", one, _most, "<= 2"),
+        _figure("seconds, second", "  where a second effect was sought", two, _most, "<= 12"),
     ]
 
 
@@ -95,6 +97,11 @@ def visible(row: Row) -> bool:
     outside the library in 95 of 100 records, at 5 % of false alarms: delta^2 against the test's deviation sqrt(2 N).
     """
     return _value(row, "delta2") >= POWER * float(np.sqrt(2.0 * row.get("measurements", np.inf)))
+
+
+def sought(row: Row) -> bool:
+    """Whether pairs of effects were fitted; a row that does not say so is taken for what it should have been."""
+    return int(row.get("depth") or (2 if row["variant"] == "outside" or "+" in row.get("missing", "") else 1)) > 1
 
 
 def certain(row: Row) -> bool:

@@ -53,6 +53,7 @@ def row(trial: Trial) -> dict[str, Any]:
         "plausible": [written(_names(candidate.effects)) for candidate in verdict.plausible],
         "plausible_weights": [candidate.weight for candidate in verdict.plausible],
         "candidates": len(found.problem.terms),
+        "depth": max((len(hypothesis.active) for hypothesis in found.fitted), default=0),
         "measurements": found.problem.count,
         "seconds": seconds,
         "cpu_seconds": busy,
@@ -187,7 +188,7 @@ def _coefficients(trial: Trial, verdict: Verdict) -> dict[str, Any]:
     for entry in trial.missing:
         named = next(n for n in verdict.effects if (n.effect, n.equation) == (entry.effect, entry.equation))
         # Coefficients come first, inner scales after them.
-        stated = list(named.coefficients.values())[: len(trial.effects[entry.effect].coefficients)]
+        stated = list(named.coefficients.values())[: len(trial.library[entry.effect].coefficients)]
         for (name, true), c in zip(entry.coefficients.items(), stated, strict=False):
             label = f"{entry.effect}.{name}" if counts[entry.effect] == 1 else f"{entry.effect}@{entry.equation}.{name}"
             if c.sd > 0 and np.isfinite(c.sd):
