@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -104,3 +105,18 @@ def serve(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Se
     yield start
     for served in started:
         served.end()
+
+
+@pytest.fixture(scope="module")
+def served(serve: Callable[..., Served]) -> Served:
+    """A server with nothing named at its start."""
+    return serve()
+
+
+@pytest.fixture(scope="module")
+def client(served: Served) -> Iterator[Any]:
+    """A browser's part: the cookie, the Origin, the address."""
+    httpx = pytest.importorskip("httpx", reason="the tests ask with httpx")
+    with httpx.Client(base_url=served.origin, headers={"origin": served.origin}, timeout=120) as inside:
+        assert inside.get("/", params={"token": served.token}).status_code == 303
+        yield inside

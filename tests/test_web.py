@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import http.client
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,28 +18,7 @@ pytest.importorskip("starlette", reason="the extra web is not installed")
 pytest.importorskip("uvicorn", reason="the extra web is not installed")
 httpx = pytest.importorskip("httpx", reason="the tests ask with httpx")
 
-DECAY = """name = "decay"
-[states]
-x = "-k*x + u"
-[parameters]
-k = 1.0
-[inputs]
-u = "u"
-[outputs]
-x = { equation = "x", sigma = 0.01 }
-"""
-
-
-@pytest.fixture(scope="module")
-def served(serve: Callable[..., Any]) -> Any:
-    return serve()
-
-
-@pytest.fixture(scope="module")
-def client(served: Any) -> Iterator[Any]:
-    with httpx.Client(base_url=served.origin, headers={"origin": served.origin}, timeout=120) as inside:
-        assert inside.get("/", params={"token": served.token}).status_code == 303
-        yield inside
+DECAY = Path(__file__).with_name("decay.toml").read_text(encoding="utf-8")
 
 
 def _files(served: Any) -> list[Path]:

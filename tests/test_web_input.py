@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,30 +16,9 @@ from suite.readers import read_record
 
 pytest.importorskip("starlette", reason="the extra web is not installed")
 pytest.importorskip("uvicorn", reason="the extra web is not installed")
-httpx = pytest.importorskip("httpx", reason="the tests ask with httpx")
+pytest.importorskip("httpx", reason="the tests ask with httpx")
 
-DECAY = """name = "decay"
-[states]
-x = "-k*x + u"
-[parameters]
-k = 1.0
-[inputs]
-u = "u"
-[outputs]
-x = { equation = "x", sigma = 0.01 }
-"""
-
-
-@pytest.fixture(scope="module")
-def served(serve: Callable[..., Any]) -> Any:
-    return serve()
-
-
-@pytest.fixture(scope="module")
-def client(served: Any) -> Iterator[Any]:
-    with httpx.Client(base_url=served.origin, headers={"origin": served.origin}, timeout=120) as inside:
-        assert inside.get("/", params={"token": served.token}).status_code == 303
-        yield inside
+DECAY = Path(__file__).with_name("decay.toml").read_text(encoding="utf-8")
 
 
 def _csv(rows: int = 60) -> str:
@@ -165,9 +143,10 @@ def test_the_sliders_show_the_free_run(client: Any, data: str, tmp_path: Path, i
 def test_examples_open(client: Any) -> None:
     """Every example that the page offers has a model that can be read, and data that it can be compared with."""
     start = client.get("/api/start").json()
+    examples = client.get("/api/examples").json()["examples"]
     assert start["loaded"] is None
     assert start["bench"] is False
-    names = [entry["name"] for entry in start["examples"]]
+    names = [entry["name"] for entry in examples]
     assert "paper" in names
     assert len(names) >= 5
     for name in names:

@@ -45,20 +45,24 @@ def _json(text: str) -> Response:
 async def start(request: Request) -> Response:
     """What the page opens with."""
     desk = desk_of(request)
-    assert desk.examples is not None
-    # The task is everybody's: who leaves does not end it.
-    examples = json.loads(await asyncio.shield(desk.examples))["examples"]
     return _json(
         json.dumps(
             {
                 "version": __version__,
                 "limit": DATA_LIMIT,
-                "examples": examples,
                 "loaded": desk.loaded,
                 "bench": desk.store is not None,
             }
         )
     )
+
+
+async def examples(request: Request) -> Response:
+    """The list of ready models."""
+    task = desk_of(request).examples
+    assert task is not None
+    # The task is everybody's: who leaves does not end it.
+    return _json(await asyncio.shield(task))
 
 
 async def data(request: Request) -> Response:
@@ -157,6 +161,7 @@ def _store(request: Request) -> str:
 ROUTES = [
     Route("/", page),
     Route("/api/start", start),
+    Route("/api/examples", examples),
     Route("/api/data", data, methods=["POST"]),
     Route("/api/example", example, methods=["POST"]),
     Route("/api/model", model, methods=["POST"]),

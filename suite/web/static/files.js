@@ -153,8 +153,9 @@ export async function start() {
   at("example").addEventListener("click", () => openExample("mug"));
   at("try").addEventListener("click", () => openExample("mug"));
   await tried(async () => {
-    const { examples, loaded } = await get("api/start");
-    menu(examples);
+    const { loaded } = await get("api/start");
+    // All cases are loaded for the list, which takes seconds; nothing else waits for it.
+    void tried(async () => menu((await get("api/examples")).examples));
     if (loaded) await opened("as given", loaded.model, loaded.data, "opened");
   });
 }
