@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import fnmatch
 import inspect
+import math
 import re
 import typing
 from collections.abc import Iterable, Mapping
@@ -19,6 +20,7 @@ from suite.estimator import Estimator
 
 GRID = re.compile(r"(?P<pattern>.+)\[(?P<points>[^\[\]]*=[^\[\]]*)\]")
 Value = float | str
+MOST = 10_000  # points of one grid
 
 
 def split(entry: str) -> tuple[str, dict[str, list[Value]]]:
@@ -43,6 +45,8 @@ def split(entry: str) -> tuple[str, dict[str, list[Value]]]:
 
 def variants(grid: Mapping[str, list[Value]]) -> list[str]:
     """The label of each point: the product of the values of all keywords, in the order given."""
+    if math.prod(map(len, grid.values())) > MOST:
+        raise InputError(f"a grid over {', '.join(grid)} of more than {MOST} points; give fewer values")
     points = product(*([(name, value) for value in values] for name, values in grid.items()))
     return [",".join(f"{name}={_text(value)}" for name, value in point) for point in points]
 

@@ -23,6 +23,7 @@ from suite.errors import InputError
 SHIPPED = Path(__file__).parent / "plans"
 VARIANTS = ("default", "tuned")
 KINDS = ("estimation", "recovery")
+MOST = 1_000_000  # cells of a plan
 
 
 @dataclass(frozen=True)
@@ -64,13 +65,14 @@ class Plan:
             return self._recovery_cells()
         estimators = references.methods()
         picked = grids.chosen(self.estimators, estimators)
-        cells = []
+        cells: list[Cell] = []
         for case in self.chosen_cases():
             measured = case.truth is None
             for noise in (0.0,) if measured else self.noises or case.noises:
                 for name, points in picked.items():
                     if name in references.REFERENCES:
                         count = 0 if measured else self.seeds
+                        self._bounded(len(cells) + count)
                         cells += [Cell(case.name, noise, name, references.VARIANT, seed) for seed in range(count)]
                         continue
                     for variant in (*(self.variants if "" in points else ()), *filter(None, points)):
@@ -78,6 +80,7 @@ class Plan:
                             continue
                         count = (runs or {}).get(case.name, 1) if measured else self.seeds
                         count = limits.allowed(self.rules, name, variant, len(case.deficient.states), count)
+                        self._bounded(len(cells) + count)
                         cells += [Cell(case.name, noise, name, variant, seed) for seed in range(count)]
         return cells
 
@@ -103,7 +106,7 @@ class Plan:
         """Every case under the conditions that it has, for every method; a measured case has none."""
         effects = plugins.effects()
         methods = _chosen(self.estimators, dict.fromkeys((OURS, *RIVALS)), "method")
-        cells = []
+        cells: list[Cell] = []
         for case, method, condition in product(self.chosen_cases(), methods, self.variants):
             if method != OURS and condition not in self.rival_variants:
                 continue
@@ -111,8 +114,13 @@ class Plan:
                 continue
             count = min(self.seeds, self.seeds_of.get(condition, self.seeds), self.seeds_of.get(method, self.seeds))
             noises = [noise for noise in self.noises or case.noises if noise > 0]
+            self._bounded(len(cells) + count * len(noises))
             cells += [Cell(case.name, noise, method, condition, seed) for noise in noises for seed in range(count)]
         return cells
+
+    def _bounded(self, cells: int) -> None:
+        if cells > MOST:
+            raise InputError(f"{self.name}: more than {MOST} cells; take fewer seeds, noises or points of a grid")
 
 
 def _chosen(patterns: Sequence[str], known: dict[str, Any], kind: str) -> list[str]:
@@ -136,6 +144,8 @@ def load(name: str) -> Plan:
         raise InputError(f"no plan {name!r}: it is neither a readable file nor one of {', '.join(shipped())}") from None
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path}: not TOML: {error}") from None
+    except (RecursionError, ValueError):
+        raise InputError(f"{path}: not TOML: nested too deeply or a number too long; simplify it") from None
     return parse(table, path.stem, str(path))
 
 

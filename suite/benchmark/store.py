@@ -62,7 +62,7 @@ class Store:
     def _in_words(self) -> Iterator[None]:
         try:
             yield
-        except sqlite3.Error as error:
+        except (sqlite3.Error, UnicodeDecodeError) as error:
             raise InputError(
                 f"{self.path}: cannot be used as a store of results ({error}); what it holds is kept: mend what is "
                 f"wrong (space, permissions) or {self.elsewhere}"
@@ -79,6 +79,11 @@ class Store:
         with self._in_words():
             return self.connection.execute(statement, values)
 
+    def all(self, statement: str, values: Sequence[Any] = ()) -> list[tuple[Any, ...]]:
+        """What a query finds; a damaged page shows only where it is read."""
+        with self._in_words():
+            return self.connection.execute(statement, values).fetchall()
+
     @contextlib.contextmanager
     def transaction(self) -> Iterator[None]:
         """All statements inside or none."""
@@ -94,14 +99,14 @@ class Store:
 
     def keys(self) -> dict[Cell, str]:
         """The key of each stored cell: a cell whose key is unchanged need not run again."""
-        return {Cell(*row[:5]): row[5] for row in self.execute(f"SELECT {CELL}, key FROM cells")}
+        return {Cell(*row[:5]): row[5] for row in self.all(f"SELECT {CELL}, key FROM cells")}
 
     def key(self, cell: Cell, since: float = 0.0) -> str | None:
         """The key of a cell that was stored at `since` (seconds since 1970) or later, or None."""
         where = '"case" = ? AND noise = ? AND estimator = ? AND variant = ? AND seed = ? AND "when" >= ?'
         values = (cell.case, cell.noise, cell.estimator, cell.variant, cell.seed, since)
-        found = self.execute(f"SELECT key FROM cells WHERE {where}", values).fetchone()
-        return None if found is None else str(found[0])
+        found = self.all(f"SELECT key FROM cells WHERE {where}", values)
+        return str(found[0][0]) if found else None
 
     def put(self, cell: Cell, key: str, row: Mapping[str, Any]) -> None:
         """Commit a finished cell in place of an older row of it."""
@@ -110,14 +115,26 @@ class Store:
 
     def rows(self) -> list[dict[str, Any]]:
         """Every stored row, flat, in the order of the cells."""
-        found = self.execute(f'SELECT {CELL}, key, row, "when" FROM cells ORDER BY {CELL}')
+        found = self.all(f'SELECT {CELL}, key, row, "when" FROM cells ORDER BY {CELL}')
         names = ("case", "noise", "estimator", "variant", "seed", "key")
-        return [{**dict(zip(names, r, strict=False)), **json.loads(r[6]), "when": r[7]} for r in found]
+        return [{**dict(zip(names, r, strict=False)), **self._object(r[6]), "when": r[7]} for r in found]
 
     def tuning(self, key: str, since: float = 0.0) -> dict[str, Any] | None:
         """Tuned values under a key, stored at `since` (seconds since 1970) or later, or None."""
-        found = self.execute('SELECT "values" FROM tunings WHERE key = ? AND "when" >= ?', (key, since)).fetchone()
-        return None if found is None else dict(json.loads(found[0]))
+        found = self.all('SELECT "values" FROM tunings WHERE key = ? AND "when" >= ?', (key, since))
+        return self._object(found[0][0]) if found else None
+
+    def _object(self, text: Any) -> dict[str, Any]:
+        """What a row holds as JSON."""
+        try:
+            held = json.loads(text)
+        except (TypeError, ValueError, RecursionError):
+            held = None
+        if not isinstance(held, dict):
+            raise InputError(
+                f"{self.path}: a row is damaged ({text!r:.40}); take a copy of the file, or {self.elsewhere}"
+            )
+        return held
 
     def put_tuning(self, key: str, values: Mapping[str, Any]) -> None:
         """Commit tuned values."""
