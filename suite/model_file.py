@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import tomllib
 from collections.abc import Collection, Mapping
 from dataclasses import replace
@@ -18,7 +19,10 @@ from suite.model_effects import effects
 from suite.model_text import to_toml as to_toml
 from suite.units import check
 
-LARGEST = 1_000_000
+LARGEST = 250_000  # bytes; the largest of the package has some thousands
+MOST_PARTS = 100  # of a dotted key, which is read in a time with the square of its parts
+QUOTED = re.compile(r"\"[^\"]*\"|'[^']*'|#.*")
+BETWEEN = re.compile(r"[^\w\-. \t]")
 TABLES = ("states", "parameters", "inputs", "outputs", "initial", "suspect", "units")
 KEYS = ("name", "time", *TABLES, "effects")
 
@@ -31,6 +35,7 @@ def read_model(path: str | os.PathLike[str]) -> Model:
 
 def from_toml(text: str, source: str = "model") -> Model:
     """The model in a text; `source` opens every error sentence."""
+    _refuse_large(text, source)
     try:
         document = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -43,6 +48,17 @@ def from_toml(text: str, source: str = "model") -> Model:
 def write_model(model: Model, path: str | os.PathLike[str]) -> None:
     """Write the model's file: whole or not at all, also where the process is killed meanwhile."""
     write_whole(Path(path), to_toml(model))
+
+
+def _refuse_large(text: str, source: str) -> None:
+    """Refuse what would take longer to read than a model may."""
+    if len(text) > LARGEST:
+        raise ModelError(f"{source}: larger than {LARGEST // 1000} kB, too large for a model file; is it the data?")
+    for number, line in enumerate(text.split("\n"), 1):
+        if line.count(".") > MOST_PARTS:
+            keys = BETWEEN.split(QUOTED.sub("", line))
+            if max(key.count(".") for key in keys) > MOST_PARTS:
+                raise ModelError(f"{source}: a key of more than {MOST_PARTS} parts (at line {number}); mend that line")
 
 
 def _text(file: Path) -> str:
@@ -59,7 +75,7 @@ def _text(file: Path) -> str:
     except OSError as error:
         raise ModelError(f"{file}: cannot be read ({error.strerror}); check its permissions") from None
     if len(raw) > LARGEST:
-        raise ModelError(f"{file.name}: larger than 1 MB, too large for a model file; is it the data?")
+        raise ModelError(f"{file.name}: larger than {LARGEST // 1000} kB, too large for a model file; is it the data?")
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError:

@@ -7,32 +7,23 @@ import io
 import itertools
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from suite import mat_file, parquet_file
+from suite.columns import Array, Table
 from suite.errors import DataError
 from suite.files import write_whole
 
-Array = npt.NDArray[np.float64]
+__all__ = ["Table", "read_table", "write_csv"]
 
 # What pandas and people write for "nothing was measured here".
 MISSING = frozenset({"", "na", "n/a", "#n/a", "nan", "-nan", "null", "none", "<na>"})
 DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+([eE][+-]?\d+)?\s*\Z")
-
-
-@dataclass(frozen=True)
-class Table:
-    """A file's columns by name; `read` gets some of them as (N,) floats, NaN where empty, `place` names a row."""
-
-    file: str
-    columns: tuple[str, ...]
-    read: Callable[[Sequence[str]], dict[str, Array]]
-    place: Callable[[int], str]
 
 
 def read_table(path: str | os.PathLike[str]) -> Table:
@@ -47,9 +38,9 @@ def read_table(path: str | os.PathLike[str]) -> Table:
         ".tsv": _csv,
         ".txt": _csv,
         ".dat": _csv,
-        ".parquet": _parquet,
-        ".pq": _parquet,
-        ".mat": _mat,
+        ".parquet": parquet_file.read,
+        ".pq": parquet_file.read,
+        ".mat": mat_file.read,
     }
     kind = kinds.get(file.suffix.lower())
     if kind is None:
@@ -119,12 +110,27 @@ class _Text:
         self.refuse_wide(*next(self.rows()))
 
     def split(self, line: str) -> list[str]:
-        return next(csv.reader([line.rstrip("\r")], delimiter=self.separator, skipinitialspace=True), [])
+        try:
+            return next(csv.reader([line.rstrip("\r")], delimiter=self.separator, skipinitialspace=True), [])
+        except csv.Error:
+            raise self.long(1 + self.text[: self.text.find(line)].count("\n")) from None
+
+    def long(self, line: int) -> DataError:
+        """The sentence for what the csv module does not read: a cell of more than 131,072 characters."""
+        return DataError(
+            f"{self.name}, line {line}: a cell of more than {csv.field_size_limit()} characters; close its quote"
+        )
 
     def rows(self) -> Iterator[tuple[int, list[str]]]:
         """Rows that hold something, each with its line number."""
         reader = csv.reader(io.StringIO(self.text), delimiter=self.separator, skipinitialspace=True)
-        for row in reader:
+        while True:
+            try:
+                row = next(reader)
+            except StopIteration:
+                return
+            except csv.Error:
+                raise self.long(reader.line_num) from None
             if reader.line_num > self.skipped + 1 and not all(cell.strip().lower() in MISSING for cell in row):
                 yield reader.line_num, row
 
@@ -217,64 +223,3 @@ def _is_number(text: str) -> bool:
     except ValueError:
         return False
     return "_" not in text
-
-
-def _parquet(file: Path) -> Table:
-    import pyarrow
-    import pyarrow.parquet as pq
-
-    try:
-        schema = pq.read_schema(file)
-    except pyarrow.ArrowInvalid:
-        raise DataError(f"{file.name}: not a parquet file; write it again or save it as CSV") from None
-
-    def read(columns: Sequence[str]) -> dict[str, Array]:
-        table = pq.read_table(file, columns=list(dict.fromkeys(columns)))
-        return {name: _floats(file.name, name, table[name].to_pandas().to_numpy()) for name in columns}
-
-    return Table(file.name, tuple(schema.names), read, lambda row: f"row {row + 1}")
-
-
-def _mat(file: Path) -> Table:
-    from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
-
-    try:
-        contents = loadmat(file, squeeze_me=False)
-    except NotImplementedError:
-        raise DataError(f"{file.name}: a MAT file of version 7.3 is not read; save it with save(..., '-v7')") from None
-    except (MatReadError, ValueError, TypeError, KeyError, IndexError, EOFError):
-        raise DataError(f"{file.name}: not a MAT file; save it with save(..., '-v7')") from None
-    # Vectors are columns, whichever way they lie; constants and matrices beside them are no one's column.
-    vectors = {
-        name: value.reshape(-1)
-        for name, value in contents.items()
-        if isinstance(value, np.ndarray) and value.ndim == 2 and 1 == min(value.shape) < max(value.shape)
-    }
-
-    def read(columns: Sequence[str]) -> dict[str, Array]:
-        arrays = {name: _floats(file.name, name, vectors[name]) for name in columns}
-        lengths = {name: len(array) for name, array in arrays.items()}
-        if len(set(lengths.values())) > 1:
-            shown = ", ".join(f"{name} {length}" for name, length in lengths.items())
-            raise DataError(f"{file.name}: the columns differ in length ({shown}); save vectors of one length")
-        return arrays
-
-    return Table(file.name, tuple(vectors), read, lambda row: f"sample {row + 1}")
-
-
-def _floats(file: str, name: str, column: npt.NDArray[np.generic]) -> Array:
-    if column.dtype.kind in "biuf":
-        return column.astype(np.float64)
-    if column.dtype.kind in "Mm":
-        raise DataError(f"{file}, column {name}: holds dates; convert them to seconds from the start")
-    values = np.empty(len(column))
-    for row, cell in enumerate(column.tolist()):
-        try:
-            values[row] = np.nan if cell is None else float(cell)
-        except (TypeError, ValueError):
-            raise DataError(
-                f"{file}, row {row + 1}, column {name}: expected a number, got {cell!r}; "
-                "correct it, or leave the cell empty if it is missing"
-            ) from None
-    return values

@@ -19,7 +19,6 @@ from suite.errors import InputError
 
 PORT = 8420
 TRIED = 20  # ports from the first one on, where none was asked for
-MODEL_LIMIT = 1_000_000
 
 
 def run(args: argparse.Namespace) -> int:
@@ -102,8 +101,13 @@ def _text(path: Path | None) -> str | None:
     _readable(path)
     if path is None:
         return None
-    if path.stat().st_size > MODEL_LIMIT:
-        raise InputError(f"{path}: larger than 1 MB, too large for a model file; is it the data? The model comes first")
+    from suite.model_file import LARGEST
+
+    if path.stat().st_size > LARGEST:
+        raise InputError(
+            f"{path}: larger than {LARGEST // 1000} kB, too large for a model file; is it the data? "
+            "The model comes first"
+        )
     try:
         return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError:
