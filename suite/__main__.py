@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
-import argparse
-import os
+import signal
 import sys
+
+# Until `ending` sees to it, an interrupt of the command ends it without a word; one that is ignored stays so.
+if (__name__ == "__main__" or sys.argv[0].endswith("unmodelled")) and (
+    signal.getsignal(signal.SIGINT) is signal.default_int_handler
+):
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+import argparse
+import contextlib
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
-from suite import __version__, bench_verbs, fleet_verb
+from suite import __version__, bench_verbs, ending, fleet_verb
 from suite.errors import InputError
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
@@ -101,53 +109,87 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; returns its exit code."""
-    args = parser().parse_args(argv)
-    warnings.showwarning = _one_line
-    # What numerics meet on the way (an overflow in a trial step) is no news; its outcome is.
-    warnings.simplefilter("ignore", RuntimeWarning)
+    """Run one command, by default that of this process; returns its exit code."""
+    if argv is None:
+        ending.prepare()
     try:
-        if args.verb == "bench":
-            return bench_verbs.run(args)
-        if args.verb == "diagnose" and fleet_verb.asked(args):
-            return fleet_verb.run(args)
-        if args.verb == "watch":
-            from suite import watch_verb
-
-            return watch_verb.run(args)
-        if args.verb == "serve":
-            from suite.web import verb
-
-            return verb.run(args)
-        if args.verb == "list":
-            from suite import listing
-
-            return listing.run(args)
-        if args.verb == "new":
-            from suite import scaffold
-
-            return scaffold.run(args)
-        if args.verb == "test":
-            from suite import contract
-
-            return contract.run(args)
-        from suite import verbs
-
-        return int(getattr(verbs, args.verb)(args))
+        args = _parsed(argv)
+        warnings.showwarning = _one_line
+        # What numerics meet on the way (an overflow in a trial step) is no news; its outcome is.
+        warnings.simplefilter("ignore", RuntimeWarning)
+        warnings.filterwarnings("default", "compiled code cannot be kept")
+        code = _run(args)
+        # Here, where a full disk is a sentence.
+        sys.stdout.flush()
+        return code
     except InputError as error:
-        print(f"unmodelled: {error}", file=sys.stderr)
-        return BAD_INPUT
+        return _refused(str(error))
     except BrokenPipeError:
-        # Whoever read our output has read enough; nothing may be written at exit either.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        ending.unread()
         return DONE
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
-        print(f"unmodelled: {where}{error.strerror or error}; check the path and the space left", file=sys.stderr)
-        return BAD_INPUT
+        return _refused(f"{where}{error.strerror or error}; check the path and the space left")
+    except MemoryError:
+        return _refused("memory: there is not enough for these data; take fewer samples, or another machine")
     except KeyboardInterrupt:
-        print("unmodelled: stopped; what was finished is kept", file=sys.stderr)
-        return 130
+        _tell("stopped; what was finished is kept")
+        return ending.INTERRUPTED
+    finally:
+        if argv is None:
+            ending.finish()
+
+
+def _parsed(argv: Sequence[str] | None) -> argparse.Namespace:
+    try:
+        return parser().parse_args(argv)
+    except SystemExit:
+        # What --help and --version wrote is not lost in silence.
+        sys.stdout.flush()
+        raise
+
+
+def _run(args: argparse.Namespace) -> int:
+    if args.verb == "bench":
+        return bench_verbs.run(args)
+    if args.verb == "diagnose" and fleet_verb.asked(args):
+        return fleet_verb.run(args)
+    if args.verb == "watch":
+        from suite import watch_verb
+
+        return watch_verb.run(args)
+    if args.verb == "serve":
+        from suite.web import verb
+
+        return verb.run(args)
+    if args.verb == "list":
+        from suite import listing
+
+        return listing.run(args)
+    if args.verb == "new":
+        from suite import scaffold
+
+        return scaffold.run(args)
+    if args.verb == "test":
+        from suite import contract
+
+        return contract.run(args)
+    from suite import verbs
+
+    return int(getattr(verbs, args.verb)(args))
+
+
+def _refused(sentence: str) -> int:
+    _tell(sentence)
+    # What did not reach standard output is dropped: it would fail again at exit.
+    ending.unread()
+    return BAD_INPUT
+
+
+def _tell(sentence: str) -> None:
+    # Where nobody reads it the exit code says it.
+    with contextlib.suppress(OSError):
+        print(f"unmodelled: {sentence}", file=sys.stderr)
 
 
 def _one_line(message: Warning | str, *_: object, **__: object) -> None:

@@ -22,6 +22,7 @@ from suite.discovery.loop import discover
 from suite.discovery.result import Ledger
 from suite.effect import Effect
 from suite.errors import DataError, InputError
+from suite.files import writable_folder, write_whole
 from suite.model import Model
 from suite.record import Record
 
@@ -160,8 +161,8 @@ def run(pattern: str | None, folder: Path | None, output: Path | None) -> list[d
 
 
 def _write(rows: list[dict[str, Any]], output: Path) -> None:
-    output.mkdir(parents=True, exist_ok=True)
-    (output / "measured.txt").write_text(text(rows) + "\n", encoding="utf-8")
+    writable_folder(output)
+    write_whole(output / "measured.txt", text(rows) + "\n")
     table.write(rows, output / "measured.json")
     table.write(
         [{k: v for k, v in row.items() if k not in ("plausible", "parameters")} for row in rows],

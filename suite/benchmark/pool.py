@@ -17,11 +17,13 @@ HOPELESS = 5
 def run(tasks: Iterable[Task | None], jobs: int, limit: float, memory: float = MEMORY) -> Iterator[tuple[Task, Any]]:
     """Each task with its result or Failure, as they finish; `limit` in seconds and `memory` in MiB are of one task.
 
-    Tasks are drawn when a worker is free for them; None among them means that there is none now, but there may be.
+    Tasks are drawn when a worker is free for them; None among them means that there is none now, but there may be. A
+    task whose process is killed from outside has a second one.
     """
     source = iter(tasks)
     workers: list[Worker] = []
     again: list[Task] = []
+    retried: list[Task] = []
     more, stillborn = True, 0
     try:
         while True:
@@ -55,7 +57,10 @@ def run(tasks: Iterable[Task | None], jobs: int, limit: float, memory: float = M
                 assert task is not None
                 if not worker.sound:
                     _bury(worker, workers)
-                if worker.ready:
+                if worker.ready and worker.lost and not any(task is one for one in retried):
+                    retried.append(task)
+                    again.append(task)
+                elif worker.ready:
                     yield task, outcome
                 else:
                     again.append(task)
@@ -73,8 +78,8 @@ class Hand:
         self.worker: Worker | None = None
 
     def answer(self, task: Task, limit: float, memory: float) -> Any:
-        """The task's result or Failure."""
-        outcome: Any = None
+        """The task's result or Failure; as in `run` it has a second process."""
+        outcome, lost = None, False
         for _ in range(HOPELESS):
             worker = self.worker = self.worker or Worker(limit, memory)
             worker.limit, worker.memory = limit, memory
@@ -85,8 +90,9 @@ class Hand:
             if not (given and worker.sound):
                 worker.end()
                 self.worker = None
-            if given and worker.ready:
+            if given and worker.ready and (lost or not worker.lost):
                 return outcome
+            lost |= worker.lost
         _hope(HOPELESS, outcome)
         raise AssertionError
 

@@ -1,7 +1,8 @@
 """What a run has in hand: several runs on one store each take cells that no other has.
 
 A run writes its beat into the store every second. What a run without a beat had in hand is free again, so that a killed
-run keeps nothing from the next one for longer than SILENT seconds.
+run keeps nothing from the next one for longer than SILENT seconds. A beat in the future is none: the clock was set back
+after it, and a run that lives beats again within a second.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ from suite.benchmark.worker import Task
 from suite.errors import InputError
 
 BEAT, SILENT = 1.0, 6.0
+# The runs with a beat, for the number of the value that is the time now.
+ALIVE = f"SELECT run FROM runs WHERE abs(beat - ?{{}}) < {SILENT}"
 
 
 class Reservations:
@@ -30,8 +33,8 @@ class Reservations:
         self.store, self.run, self.ended = store, f"{os.getpid()}-{uuid.uuid4().hex[:8]}", threading.Event()
 
     def __enter__(self) -> Reservations:
-        self.store.execute("DELETE FROM taken WHERE run NOT IN (SELECT run FROM runs WHERE beat > ?)", (self._alive(),))
-        self.store.execute("DELETE FROM runs WHERE beat <= ?", (self._alive(),))
+        self.store.execute(f"DELETE FROM taken WHERE run NOT IN ({ALIVE.format(1)})", (time.time(),))
+        self.store.execute(f"DELETE FROM runs WHERE run NOT IN ({ALIVE.format(1)})", (time.time(),))
         self.store.execute("INSERT INTO runs VALUES (?, ?)", (self.run, time.time()))
         self.thread = threading.Thread(target=self._beat, daemon=True)
         self.thread.start()
@@ -49,17 +52,14 @@ class Reservations:
         """Take a key; False where another run that is alive has it."""
         done = self.store.execute(
             "INSERT INTO taken VALUES (?1, ?2) ON CONFLICT (key) DO UPDATE SET run = ?2 "
-            "WHERE run = ?2 OR run NOT IN (SELECT run FROM runs WHERE beat > ?3)",
-            (key, self.run, self._alive()),
+            f"WHERE run = ?2 OR run NOT IN ({ALIVE.format(3)})",
+            (key, self.run, time.time()),
         )
         return done.rowcount == 1
 
     def give_back(self, key: str) -> None:
         """What is done, or need not be done, is free."""
         self.store.execute("DELETE FROM taken WHERE key = ? AND run = ?", (key, self.run))
-
-    def _alive(self) -> float:
-        return time.time() - SILENT
 
     def _beat(self) -> None:
         with contextlib.closing(sqlite3.connect(self.store.path, timeout=60.0, isolation_level=None)) as own:

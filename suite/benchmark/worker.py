@@ -24,6 +24,8 @@ START = 300.0
 MEMORY = 1024
 # How often time and memory are looked at, in seconds: memory is touched at about 1 GiB/s at most.
 WATCH = 0.05
+# The exit code of a process that another killed, such as the system where memory was short.
+KILLED = -9
 
 
 # What `Worker.look` says of a task that is not done.
@@ -48,7 +50,10 @@ class Failure:
 
 
 class Worker:
-    """One process, its pipe, the task it has, when that must be done (seconds) and its memory at most (MiB)."""
+    """One process, its pipe, the task it has, when that must be done (seconds) and its memory at most (MiB).
+
+    `lost`: it was killed from outside, which says nothing of its task.
+    """
 
     def __init__(self, limit: float, memory: float) -> None:
         self.limit, self.memory = limit, memory
@@ -61,6 +66,7 @@ class Worker:
         self.task: Task | None = None
         self.ready = False
         self.sound = True
+        self.lost = False
         self.at_rest = 0.0
         self.deadline = time.monotonic() + START
 
@@ -95,6 +101,7 @@ class Worker:
         except (EOFError, OSError):
             self.process.join()
             self.sound = False
+            self.lost = self.process.exitcode == KILLED
             return Failure("error", f"the process ended with code {self.process.exitcode}")
         except Exception as error:  # an object whose class is not known here
             return Failure("error", f"its result cannot be read: {type(error).__name__}: {error}")

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
-import os
-import tempfile
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -15,6 +14,8 @@ import llvmlite.binding as llvm
 from numba.core.typing.templates import Signature
 from numba.extending import intrinsic
 
+from suite.errors import InputError
+from suite.files import written_whole
 from suite.kernels import cache as kept
 from suite.kernels import types as nb
 from suite.kernels.cache import compile_kernel, numba
@@ -126,13 +127,6 @@ def _read(path: Path) -> bytes | None:
 
 
 def _write(path: Path, code: bytes) -> None:
-    """Atomically, as others may write the same file; a full disk costs time, not results."""
-    fresh: str | None = None
-    try:
-        with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".tmp", delete=False) as handle:
-            fresh = handle.name
-            handle.write(hashlib.sha256(code).digest() + code)
-        os.replace(fresh, path)
-    except OSError:
-        if fresh is not None:
-            Path(fresh).unlink(missing_ok=True)
+    """Whole, as others may write the same file; a full disk costs time, not results."""
+    with contextlib.suppress(InputError), written_whole(path) as fresh:
+        fresh.write_bytes(hashlib.sha256(code).digest() + code)

@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from suite.benchmark.statistics import score, summarise
+from suite.files import writable_folder, written_whole
 
 Array = npt.NDArray[np.float64]
 Row = Mapping[str, Any]
@@ -36,7 +37,7 @@ STYLE: Any = {
 
 def draw(rows: Sequence[Row], folder: Path) -> list[Path]:
     """Every figure of the matrix as SVG and PNG in `folder`; the paths written."""
-    folder.mkdir(parents=True, exist_ok=True)
+    writable_folder(folder)
     # A measured case has no truth, hence no error to show.
     known = {row["case"] for row in rows if row.get("state_nrmse") is not None}
     judged = [row for row in rows if row["status"] != "skipped" and row["case"] in known]
@@ -54,9 +55,9 @@ def draw(rows: Sequence[Row], folder: Path) -> list[Path]:
 def save(figure: Figure, stem: Path) -> list[Path]:
     """Write a figure as SVG and PNG; the same rows give the same files."""
     paths = [stem.with_name(f"{stem.name}{ending}") for ending in (".svg", ".png")]
-    with mpl.rc_context(STYLE):
-        figure.savefig(paths[0], metadata={"Date": None})
-        figure.savefig(paths[1], dpi=150)
+    with mpl.rc_context(STYLE), written_whole(paths[0]) as drawn, written_whole(paths[1]) as dots:
+        figure.savefig(drawn, format="svg", metadata={"Date": None})
+        figure.savefig(dots, format="png", dpi=150)
     return paths
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from suite.benchmark import recovery_summary as summary
 from suite.benchmark import table
+from suite.files import writable_folder, write_whole, written_whole
 from suite.report import recovery_figures
 from suite.report.vector import svg
 
@@ -16,7 +17,7 @@ Row = Mapping[str, Any]
 
 def write(rows: Sequence[Row], folder: Path) -> list[Path]:
     """Write everything to a folder; the paths written."""
-    folder.mkdir(parents=True, exist_ok=True)
+    writable_folder(folder)
     paths = []
     tables: dict[str, Sequence[Row]] = {
         "rows": list(rows), "must-reach": summary.targets(rows), "by-case": summary.by_case(rows),
@@ -30,13 +31,14 @@ def write(rows: Sequence[Row], folder: Path) -> list[Path]:
         for ending in (".svg", ".png"):
             path = folder / f"{name}{ending}"
             if ending == ".svg":
-                path.write_text(svg(figure, name) + "\n", encoding="utf-8")
+                write_whole(path, svg(figure, name) + "\n")
             else:
-                figure.savefig(path, dpi=120)
+                with written_whole(path) as beside:
+                    figure.savefig(beside, format="png", dpi=120)
             paths.append(path)
     path = folder / "recovery.md"
     parts = [f"## {heading}\n\n{table.markdown(cells)}" for heading, cells in summary.written(rows).items()]
-    path.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
+    write_whole(path, "\n\n".join(parts) + "\n")
     return [*paths, path]
 
 

@@ -7,12 +7,13 @@ from typing import Any
 
 from suite.benchmark import better, claims, table_one
 from suite.benchmark.table import grid, markdown, to_json
+from suite.files import writable_folder, write_whole
 from suite.report import table_one_figures
 
 
 def write(folder: Path, seeds: int) -> dict[str, Any]:
     """Write table1.md, table1.json and the figures to `folder`; the paths and the text that is printed."""
-    folder.mkdir(parents=True, exist_ok=True)
+    writable_folder(folder)
     ledger = claims.ledger()
     entries = better.table(seeds)
     title = f"a3 by method over {seeds} seeds, mean +- sd in 1e-4"
@@ -34,13 +35,13 @@ def write(folder: Path, seeds: int) -> dict[str, Any]:
             "![Figure 1](figure-1.svg)\n\n![a3 by method](a3-by-method.svg)\n",
         ]
     )
-    (folder / "table1.md").write_text(page, encoding="utf-8")
+    write_whole(folder / "table1.md", page)
     rows = [
         {"method": e.method, "measured": list(e.measured), "noise": e.noise, "a3": list(e.values), "reason": e.reason}
         for e in entries
     ]
     stored = {"claims": ledger, "open": table_one.cells(), "methods": rows, "seeds": seeds}
-    (folder / "table1.json").write_text(to_json(stored) + "\n", encoding="utf-8")
+    write_whole(folder / "table1.json", to_json(stored) + "\n")
     figures = [*table_one_figures.figure_one(folder), *table_one_figures.comparison(entries, folder)]
     paths = [folder / "table1.md", folder / "table1.json", *figures]
     return {**stored, "text": text, "files": [str(path) for path in paths]}
