@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from suite import expressions
+from suite.along import rate_slopes
 from suite.estimator import Estimate, Estimator
 from suite.filtering import filtered, held
 from suite.least_squares import MEMORY, LeastSquares
@@ -29,6 +30,16 @@ def candidates(model: Model) -> dict[str, list[str]]:
         for s in model.suspects
     }
     return found if sum(map(len, found.values())) <= FEW else {s: ["1"] for s in model.suspects}
+
+
+def _shapes(grown: Model, record: Record, X: Array, equations: Sequence[str]) -> Array:
+    """The terms without their coefficients at the states X (N, n), (N, n, terms); each term is in one equation."""
+    states, own = list(grown.states), len(grown.parameters) - len(equations)
+    G = np.zeros((*X.shape, len(equations)))
+    for i in sorted({states.index(equation) for equation in equations}):
+        columns = [j for j, equation in enumerate(equations) if equation == states[i]]
+        G[:, i, columns] = rate_slopes(grown, record, X, i, [own + j for j in columns])
+    return G
 
 
 class InvariantEmbeddingLeastSquares(Estimator):
@@ -53,16 +64,10 @@ class InvariantEmbeddingLeastSquares(Estimator):
         grown, names = model, [f"rls{number}" for number in range(len(chosen))]
         for name, (state, text) in zip(names, chosen, strict=True):
             grown = grown.plus(state, f"+{name}*({text})", {name: Parameter(0.0, free=True)})
-        own = slice(len(model.parameters), None)
-
-        def shapes(k: int, x: Array) -> Array:
-            """The terms without their coefficients at sample k, (n, terms)."""
-            return grown.program.rates(record.t[k], x, record.u[k], grown.values)[2][:, own]
-
         path = filtered(model, record, prior.x0, prior.P0, prior.Q, prior.R)
-        X = held(path.x, path.failed_at)
+        G = _shapes(grown, record, held(path.x, path.failed_at), [state for state, _ in chosen])
         with np.errstate(all="ignore"):
-            rms = np.sqrt(np.mean(np.square([shapes(k, X[k]).sum(axis=0) for k in range(N)]), axis=0))
+            rms = np.sqrt(np.mean(np.square(G.sum(axis=1)), axis=0))
         allowed = [np.sqrt(prior.Q[list(model.states).index(state)] / dt) for state, _ in chosen]
         sds = {
             name: size * float(most / scale) if np.isfinite(scale) and scale > 0.0 else 0.0
@@ -71,15 +76,18 @@ class InvariantEmbeddingLeastSquares(Estimator):
         # What an equation lacks its terms hold; one without terms keeps its noise.
         Q = np.where([state in dict(chosen) for state in model.states], 0.0, prior.Q)
         run = LeastSquares(grown, replace(prior, Q=Q), sds, {}, memory * dt, len(model.outputs))
-        x, d, P, P_d, failed = np.zeros((N, n)), np.zeros((N, n)), np.zeros((N, n, n)), np.zeros((N, n, n)), None
-        for k in range(N):
-            run.add(float(record.t[k]), record.u[k], record.y[k])
+        x, P, failed, m = np.zeros((N, n)), np.zeros((N, n, n)), None, len(chosen)
+        values, covariances = np.zeros((N, m)), np.zeros((N, m, m))
+        for k, (t, u, y) in enumerate(zip(record.t.tolist(), record.u, record.y, strict=True)):
+            run.add(t, u, y)
             if run.filter.lost:
                 failed = k
                 break
             x[k], P[k] = run.filter.x[:n], run.filter.P[:n, :n]
-            G = shapes(k, x[k])
-            d[k], P_d[k] = G @ run.value, G @ run.covariance @ G.T
+            values[k], covariances[k] = run.value, run.covariance
+        with np.errstate(all="ignore"):
+            G = _shapes(grown, record, x, [state for state, _ in chosen])
+            d, P_d = (G @ values[:, :, None])[:, :, 0], G @ covariances @ G.transpose(0, 2, 1)
         found = {f"{text}@{state}": float(a) for (state, text), a in zip(chosen, run.value, strict=True)}
         status, note = "ok", ""
         if failed is not None:

@@ -66,10 +66,12 @@ def filtered(
     nu, s = np.zeros((N, m)), np.ones((N, m))
     work = workspace(n, program.inputs, program.parameters, 0)
     own = ekf_workspace(n, program.parameters, m)
+    off = program.all_off()
     failed = ekf(
-        program.rate, program.output, *arrays(record.t, record.u), model.linear_inputs, *arrays(record.y),
+        program.step_when(off), program.rate, program.output, *arrays(record.t, record.u), model.linear_inputs,
+        *arrays(record.y),
         *arrays(*(around or (X, X))), int(around is not None), *arrays(x0, P0), model.values,
-        program.all_off(), *arrays(density), int(spread), *arrays(R), model.angles, np.zeros(0, dtype=np.int64),
+        off, *arrays(density), int(spread), *arrays(R), model.angles, np.zeros(0, dtype=np.int64),
         work, own, X, P, Xp, Pp, Phi, Qd, H, K, nu, s,
     )  # fmt: skip
     return Filtered(X, P, Xp, Pp, Phi, Qd, H, K, nu, s, None if failed < 0 else int(failed))

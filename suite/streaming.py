@@ -25,7 +25,9 @@ class Filter:
         given = arrays(prior.x0, prior.P0, model.linear_inputs, model.values, np.diag(prior.Q), prior.R, model.angles)
         # An address costs a tenth of a microsecond to hand over, a function sixteen; the program owns both.
         self._program = program
-        self.whole, self.real = packed((program.rate.address, program.output.address), program.all_off(), *given)
+        off = program.all_off()
+        addresses = program.step_when(off), program.rate.address, program.output.address
+        self.whole, self.real = packed(addresses, off, *given)
         self.x, self.P = self.real[:n], self.real[n : n + n * n].reshape(n, n)
         self.innovation = self.real[n + n * n : n + n * n + m]
 

@@ -112,8 +112,9 @@ class _Pass:
         )  # fmt: skip
         program = model.program
         self.status = prediction_errors(
-            program.rate, program.output, t, u, model.linear_inputs, y, np.array([*starts, N]),
-            x0, p, program.all_off(), np.arange(count), np.zeros(n) if Q is None else Q, np.full(ny, 0.04),
+            program.step_when(program.all_off()), program.rate, program.output, t, u, model.linear_inputs, y,
+            np.array([*starts, N]), x0, p, program.all_off(), np.arange(count), np.zeros(n) if Q is None else Q,
+            np.full(ny, 0.04),
             np.zeros(ny) if angle is None else angle, 1, workspace(n, len(model.inputs), count, count), scratch,
             self.e, self.s, self.J, self.X, self.Y,
         )  # fmt: skip

@@ -12,7 +12,9 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from suite.kernels.integrate import transition
+from suite.kernels.integrate import workspace
+from suite.kernels.parting import parting
+from suite.kernels.types import arrays
 from suite.model import Model
 from suite.record import Record
 
@@ -21,6 +23,7 @@ Array = npt.NDArray[np.float64]
 FORGOTTEN = 8.0  # logarithm of how far neighbours part over a run, from which it is cut
 PARTED = 3.0  # the same over a stretch
 SHORTEST = 40  # samples of a stretch
+ROOM = 1_000_000  # numbers of the tangents that are kept at a time
 
 
 def stretches(model: Model, record: Record, path: Array) -> Record:
@@ -45,19 +48,25 @@ def stretches(model: Model, record: Record, path: Array) -> Record:
 
 def _growth(model: Model, record: Record, path: Array, first: int, last: int) -> Array:
     """Logarithm of the factor by which neighbours part from a run's first sample on, (samples,)."""
-    n = len(model.states)
-    V, total = np.eye(n), 0.0
+    n, program = len(model.states), model.program
     scale = np.ptp(path[first:last], axis=0)
     scale = np.where(scale > 0, scale, 1.0)
-    growth = np.zeros(last - first)
-    p, linear = model.values, model.linear_inputs
-    for k in range(first, last - 1):
-        dt = float(record.t[k + 1] - record.t[k])
-        _, Phi = transition(model.program, record.t[k], path[k], record.u[k], record.u[k + 1], linear, p, dt)
-        V = (Phi * scale / scale[:, None]) @ V
-        size = float(np.linalg.norm(V, 2))
-        if not np.isfinite(size) or size == 0.0:
+    growth, total, V = np.zeros(last - first), 0.0, np.eye(n)
+    off, none = program.all_off(), np.zeros(0, dtype=np.int64)
+    work = workspace(n, program.inputs, program.parameters, 0)
+    most = max(ROOM // (n * n), 1)
+    for begin in range(first, last - 1, most):
+        end = min(begin + most, last - 1)
+        part = slice(begin, end + 1)
+        tangents, logs = np.zeros((end - begin, n, n)), np.zeros(end - begin)
+        made = parting(
+            program.step_when(off), program.rate, *arrays(record.t[part], record.u[part], model.linear_inputs),
+            *arrays(model.values), off, none, *arrays(path[part], scale), V, np.zeros(n), np.zeros((n, n)), work,
+            tangents, logs,
+        )  # fmt: skip
+        sizes = np.log(np.linalg.norm(tangents[:made], 2, axis=(1, 2)))
+        growth[begin + 1 - first : begin + 1 - first + made] = total + np.cumsum(logs[:made]) + sizes
+        if made < end - begin:
             return growth
-        V, total = V / size, total + np.log(size)
-        growth[k + 1 - first] = total
+        total += float(logs.sum())
     return np.maximum.accumulate(growth)

@@ -59,7 +59,7 @@ class Problem(Frame):
         Q[: len(self.weights)] = q * 10.0 * self.weights**2 * self.step
         u = self.inputs(point.p)
         failed = prediction_errors(
-            program.rate, program.output, record.t, u, self.linear, record.y, record.bounds,
+            program.step_when(at.on), program.rate, program.output, record.t, u, self.linear, record.y, record.bounds,
             np.ascontiguousarray(point.x0[:, at.states]), point.p, at.on, at.columns, Q, self.R, self.angles,
             self.substeps, workspace(n, u.shape[1], program.parameters, m), scratch, e, s, J, X, Y,
         )  # fmt: skip

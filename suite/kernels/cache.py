@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import sys
 import tempfile
@@ -48,12 +49,19 @@ def _cannot_be_kept(base: Path | str, reason: str) -> None:
     )
 
 
+@cache
+def _version() -> str:
+    """A hash of the kernels' files: what a kernel calls is compiled into it, and numba looks at its own file alone."""
+    code = (path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py")))
+    return hashlib.sha256(b"".join(code)).hexdigest()[:8]
+
+
 def compile_kernel(signature: Any) -> Any:
     """Decorator: compile a kernel now, for one signature, from the cache where there is one.
 
-    Divisions by zero give inf and NaN as in numpy; the filters check for them, instead of every division. A kernel makes
-    no array, and its caller owns those it is given: without numba's counting of references, which is atomic, a step of
-    two states takes a quarter less time.
+    Divisions by zero give inf and NaN as in numpy; the filters check for them, instead of every division. A kernel
+    makes no array, and its caller owns those it is given: without numba's counting of references, which is atomic, a
+    step of two states takes a quarter less time.
     """
     options = {"error_model": "numpy", "nogil": True, "_nrt": False}
     place = folder()
@@ -61,7 +69,7 @@ def compile_kernel(signature: Any) -> Any:
         return numba.njit(signature, **options)
     # numba reads this at compile time: all caches of the kernels then live in one folder that can be written.
     config: Any = numba.config  # pyright: ignore[reportPrivateImportUsage]
-    config.CACHE_DIR = str(place / f"numba-{numba.__version__}-{sys.implementation.cache_tag}")
+    config.CACHE_DIR = str(place / f"numba-{numba.__version__}-{sys.implementation.cache_tag}-{_version()}")
 
     def compiled(function: Any) -> Any:
         try:

@@ -18,7 +18,7 @@ import numpy.typing as npt
 import sympy
 
 from suite.expressions import symbol
-from suite.kernels import native, object_code, slopes
+from suite.kernels import lines, native, object_code, slopes, unrolled
 from suite.kernels.native import Block, Place, Target
 from suite.kernels.object_code import Address
 from suite.kernels.slopes import Slopes
@@ -71,6 +71,14 @@ class Program:
     def output(self) -> Any:
         return self.functions("output")
 
+    def step_when(self, on: npt.NDArray[np.int64]) -> int:
+        """The address of the program's own step (see `unrolled`) where it has one and all gates are off, else 0."""
+        return 0 if on.any() else self._step
+
+    @cached_property
+    def _step(self) -> int:
+        return self.functions("step").address if unrolled.unrolls(self.n, self.parameters) else 0
+
     def all_off(self) -> npt.NDArray[np.int64]:
         """The gate switches, all off, (gates,)."""
         return np.zeros(self.gates, dtype=np.int64)
@@ -119,9 +127,11 @@ def compile_program(
         moving = [_Terms(gate.rates, gate.states) for gate in gates]
         reading = [_Terms(gate.outputs, gate.states) for gate in gates]
         layout = _Layout(names)
-        return native.module(
-            {"rate": layout.blocks(rates, moving, moving=True), "output": layout.blocks(outputs, reading, moving=False)}
-        )
+        rate, output = layout.blocks(rates, moving, moving=True), layout.blocks(outputs, reading, moving=False)
+        functions = [native.function("rate", rate), native.function("output", output)]
+        if unrolled.unrolls(len(states), len(parameters)):
+            functions.append(unrolled.Step("step", len(states), len(parameters), rate[0]).text())
+        return "\n".join([*lines.declared(), *functions, ""])
 
     every = [*rates, *outputs]
     every += [e for gate in gates for part in (gate.rates, gate.outputs, gate.states) for e in part.values()]
@@ -133,8 +143,9 @@ def compile_program(
 @cache
 def _generator() -> str:
     """A hash of the generator's own files: another one writes other code for the same model."""
-    files = [__file__, native.__file__, slopes.__file__, object_code.__file__]
-    return hashlib.sha256(b"".join(Path(file).read_bytes() for file in files)).hexdigest()
+    names = "codegen", "integrate", "lines", "native", "object_code", "slopes", "unrolled"
+    code = (Path(__file__).with_name(f"{name}.py").read_bytes() for name in names)
+    return hashlib.sha256(b"".join(code)).hexdigest()
 
 
 def _spelled(expressions: Iterable[sympy.Expr]) -> str:

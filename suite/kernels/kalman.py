@@ -14,28 +14,46 @@ import numpy.typing as npt
 
 from suite.kernels import types as nb
 from suite.kernels.cache import compile_kernel
-from suite.kernels.integrate import WORK, advance
+from suite.kernels.integrate import WORK
 from suite.kernels.matrix import multiply, transpose
+from suite.kernels.step import step
 
 Array = npt.NDArray[np.float64]
 
-# Hp (outputs, parameters); x, base (n,); T, P, P2 (n, n)
-EKF_WORK = nb.types.Tuple((nb.MATRIX, nb.VECTOR, nb.VECTOR, nb.MATRIX, nb.MATRIX, nb.MATRIX, nb.VECTOR))
+SMALL = 8  # states up to which products are plain sums
+
+# Hp (outputs, parameters); x, base (n,); M (n, n); yv (outputs,)
+EKF_WORK = nb.types.Tuple((nb.MATRIX, nb.VECTOR, nb.VECTOR, nb.MATRIX, nb.VECTOR))
 
 
 def ekf_workspace(n: int, parameters: int, outputs: int) -> tuple[Array, ...]:
     """The scratch arrays of `ekf`."""
-    squares = (np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n)))
-    return (np.zeros((outputs, parameters)), np.zeros(n), np.zeros(n), *squares, np.zeros(outputs))
+    return np.zeros((outputs, parameters)), np.zeros(n), np.zeros(n), np.zeros((n, n)), np.zeros(outputs)
 
 
 @compile_kernel(nb.types.void(nb.MATRIX, nb.MATRIX, nb.MATRIX, nb.MATRIX, nb.MATRIX))
 def turned(T: Any, S: Any, M: Any, W: Any, out: Any) -> None:
     """Symmetric T S T' of a symmetric S, as T (T S)'. Writes out, which may be S, and M, W."""
+    n = T.shape[0]
+    if n <= SMALL:
+        for i in range(n):
+            for j in range(n):
+                total = 0.0
+                for l in range(n):
+                    total += T[i, l] * S[l, j]
+                M[i, j] = total
+        for i in range(n):
+            for j in range(i + 1):
+                total = 0.0
+                for l in range(n):
+                    total += M[i, l] * T[j, l]
+                out[i, j] = total
+                out[j, i] = total
+        return
     multiply(T, S, M)
     transpose(M, W)
     multiply(T, W, M)
-    for i in range(T.shape[0]):
+    for i in range(n):
         for j in range(i + 1):
             out[i, j] = M[i, j]
             out[j, i] = M[i, j]
@@ -43,95 +61,101 @@ def turned(T: Any, S: Any, M: Any, W: Any, out: Any) -> None:
 
 @compile_kernel(
     nb.INT(
-        nb.MODEL, nb.MODEL, nb.VECTOR, nb.MATRIX, nb.VECTOR, nb.MATRIX, nb.MATRIX, nb.MATRIX, nb.INT, nb.VECTOR,
+        nb.INT, nb.MODEL, nb.MODEL, nb.VECTOR, nb.MATRIX, nb.VECTOR, nb.MATRIX, nb.MATRIX, nb.MATRIX, nb.INT, nb.VECTOR,
         nb.MATRIX, nb.VECTOR, nb.INDICES, nb.MATRIX, nb.INT, nb.VECTOR, nb.VECTOR, nb.INDICES, WORK, EKF_WORK,
         nb.MATRIX, nb.CUBE, nb.MATRIX, nb.CUBE, nb.CUBE, nb.CUBE, nb.CUBE, nb.CUBE, nb.MATRIX, nb.MATRIX,
     )
 )  # fmt: skip
 def ekf(
-    rate: Any, output: Any, t: Any, u: Any, linear: Any, y: Any, nominal: Any, departure: Any, around: int,
+    own: int, rate: Any, output: Any, t: Any, u: Any, linear: Any, y: Any, nominal: Any, departure: Any, around: int,
     x0: Any, P0: Any, p: Any, on: Any, Q: Any, spread: int, R: Any, angle: Any, none: Any, work: Any, ekf_work: Any,
     X: Any, P: Any, Xp: Any, Pp: Any, Phi: Any, Qd: Any, H: Any, K: Any, nu: Any, s: Any,
 ) -> int:  # fmt: skip
     """Run over one run; returns -1, or the first sample at which a number is no longer finite.
 
-    t (N,), u (N, inputs), y (N, outputs; NaN is missing), nominal, departure (N, n): where to linearise the output
-    at a sample and the step from it if `around`, else at the filter's own estimates; Q (n, n) density of the process
-    noise, added as Q dt at the end of a step, or (`spread`) as dt (Phi Q Phi' + Q)/2, its integral over the step to
-    second order; R (outputs,), angle (outputs,) 1 wraps.
+    own: the model's own step (see `step`) or 0; t (N,), u (N, inputs), y (N, outputs; NaN is missing), nominal,
+    departure (N, n): where to linearise the output at a sample and the step from it if `around`, else at the filter's
+    own estimates; Q (n, n) density of the process noise, added as Q dt at the end of a step, or (`spread`) as
+    dt (Phi Q Phi' + Q)/2, its integral over the step to second order; R (outputs,), angle (outputs,) 1 wraps.
     Writes X, P filtered, Xp, Pp predicted, Phi, Qd of the step into a sample (N, n, n), H and K (N, outputs, n),
     nu and s (N, outputs; 0 and 1 where missing), and the work arrays.
     """
-    Hp, x, base, T, C, C2, yv = ekf_work
+    Hp, x, base, M, yv = ekf_work
     n = x0.shape[0]
     ny = y.shape[1]
     for i in range(n):
         x[i] = x0[i]
         for j in range(n):
-            C[i, j] = P0[i, j]
+            Pp[0, i, j] = P0[i, j]
             Phi[0, i, j] = 1.0 if i == j else 0.0
             Qd[0, i, j] = 0.0
     for k in range(t.shape[0]):
+        C = P[k]
         if k > 0:
             dt = t[k] - t[k - 1]
+            T = Phi[k]
             for i in range(n):
                 base[i] = departure[k - 1, i] if around != 0 else x[i]
                 # x becomes the distance from the point of linearisation.
                 x[i] -= base[i]
-            advance(rate, t[k - 1], dt, u[k - 1], u[k], linear, p, on, none, 1, base, T, work)
+            step(own, rate, t[k - 1], dt, u[k - 1], u[k], linear, p, on, none, 1, base, T, work)
             # x- = f(departure) + Phi (x - departure),  P- = Phi P Phi' + Qd
             for i in range(n):
                 for j in range(n):
                     base[i] += T[i, j] * x[j]
-                    Phi[k, i, j] = T[i, j]
                     Qd[k, i, j] = dt * Q[i, j]
             for i in range(n):
                 x[i] = base[i]
             if spread != 0:
-                turned(T, Q, C2, P[k], Qd[k])
+                turned(T, Q, M, C, Qd[k])
                 for i in range(n):
                     for j in range(n):
                         Qd[k, i, j] = 0.5 * dt * (Qd[k, i, j] + Q[i, j])
-            turned(T, C, C2, P[k], Pp[k])
+            turned(T, P[k - 1], M, C, Pp[k])
             for i in range(n):
                 for j in range(n):
-                    C[i, j] = Pp[k, i, j] + Qd[k, i, j]
+                    Pp[k, i, j] += Qd[k, i, j]
         for i in range(n):
             Xp[k, i] = x[i]
             for j in range(n):
-                Pp[k, i, j] = C[i, j]
+                C[i, j] = Pp[k, i, j]
             base[i] = nominal[k, i] if around != 0 else x[i]
         output(t[k], base, u[k], p, on, yv, H[k], Hp)
         for c in range(ny):
             nu[k, c] = 0.0
             s[k, c] = 1.0
+            h = H[k, c]
+            gain = K[k, c]
             for i in range(n):
-                K[k, c, i] = 0.0
+                gain[i] = 0.0
             if math.isnan(y[k, c]):
                 continue
             e = y[k, c] - yv[c]
             if angle[c] > 0.0:
                 e = math.atan2(math.sin(e), math.cos(e))
             variance = R[c]
+            # C H' along the rows of the symmetric C: most outputs read few states.
+            for j in range(n):
+                slope = h[j]
+                if slope != 0.0:
+                    e -= slope * (x[j] - base[j])
+                    for i in range(n):
+                        gain[i] += C[j, i] * slope
             for i in range(n):
-                e -= H[k, c, i] * (x[i] - base[i])
-                for j in range(n):
-                    K[k, c, i] += C[i, j] * H[k, c, j]
-                variance += H[k, c, i] * K[k, c, i]
+                variance += h[i] * gain[i]
             nu[k, c] = e
             s[k, c] = variance
             for i in range(n):
-                K[k, c, i] /= variance
-                x[i] += K[k, c, i] * e
+                gain[i] /= variance
+                x[i] += gain[i] * e
             for i in range(n):
                 for j in range(n):
-                    C[i, j] -= K[k, c, i] * K[k, c, j] * variance
+                    C[i, j] -= gain[i] * gain[j] * variance
         sound = True
         for i in range(n):
             X[k, i] = x[i]
             sound = sound and math.isfinite(x[i])
             for j in range(n):
-                P[k, i, j] = C[i, j]
                 sound = sound and math.isfinite(C[i, j])
         if not sound:
             return k

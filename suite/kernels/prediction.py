@@ -12,7 +12,8 @@ from typing import Any
 
 from suite.kernels import types as nb
 from suite.kernels.cache import compile_kernel
-from suite.kernels.integrate import WORK, advance
+from suite.kernels.integrate import WORK
+from suite.kernels.step import step as move
 
 # Hp (outputs, parameters), Hx (outputs, n), y (outputs,); x (n,); P, P2 (n, n); S, S2, T (n, n + columns)
 FILTER_WORK = nb.types.Tuple(
@@ -22,20 +23,21 @@ FILTER_WORK = nb.types.Tuple(
 
 @compile_kernel(
     nb.INT(
-        nb.MODEL, nb.MODEL, nb.VECTOR, nb.MATRIX, nb.VECTOR, nb.MATRIX, nb.INDICES,
+        nb.INT, nb.MODEL, nb.MODEL, nb.VECTOR, nb.MATRIX, nb.VECTOR, nb.MATRIX, nb.INDICES,
         nb.MATRIX, nb.VECTOR, nb.INDICES, nb.INDICES, nb.VECTOR, nb.VECTOR, nb.VECTOR, nb.INT,
         WORK, FILTER_WORK, nb.MATRIX, nb.MATRIX, nb.CUBE, nb.MATRIX, nb.MATRIX,
     )
 )  # fmt: skip
 def prediction_errors(
-    rate: Any, output: Any, t: Any, u: Any, linear: Any, y: Any, starts: Any,
+    own: int, rate: Any, output: Any, t: Any, u: Any, linear: Any, y: Any, starts: Any,
     x0: Any, p: Any, on: Any, columns: Any, Q: Any, R: Any, angle: Any, substeps: int,
     work: Any, filter_work: Any, e: Any, s: Any, J: Any, X: Any, Y: Any,
 ) -> int:  # fmt: skip
     """Run over all samples; returns -1, or the first sample at which a number is no longer finite.
 
-    t (N,), u (N, inputs), y (N, outputs; NaN is missing), starts (runs + 1,): first sample of each run and N,
-    x0 (runs, n), Q (n,) density of the process noise, R (outputs,) variance of a sample, angle (outputs,) 1 wraps.
+    own: the model's own step (see `step`) or 0; t (N,), u (N, inputs), y (N, outputs; NaN is missing), starts
+    (runs + 1,): first sample of each run and N, x0 (runs, n), Q (n,) density of the process noise, R (outputs,)
+    variance of a sample, angle (outputs,) 1 wraps.
     Writes e (N, outputs; 0 where missing), s (N, outputs; 1 where missing), J (N, outputs, n + columns: of the run's
     own x0, then of the parameters), X (N, n) the filtered state, Y (N, outputs) the predicted outputs.
     """
@@ -59,7 +61,8 @@ def prediction_errors(
         for step in range(first, last):
             if step > first:
                 dt = t[step] - t[step - 1]
-                advance(rate, t[step - 1], dt, u[step - 1], u[step], linear, p, on, columns, substeps, xv, T, work)
+                before = step - 1
+                move(own, rate, t[before], dt, u[before], u[step], linear, p, on, columns, substeps, xv, T, work)
                 # S <- Phi S + [0 | G]
                 for i in range(n):
                     for j in range(n):

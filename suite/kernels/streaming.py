@@ -23,12 +23,12 @@ from suite.kernels.kalman import ekf
 Array = npt.NDArray[np.float64]
 Whole = npt.NDArray[np.int64]
 
-# Entries of `whole`: the addresses of the model's functions, four sizes, 1 where the filter was lost.
-RATE, OUTPUT, STATES, INPUTS, OUTPUTS, PARAMETERS, LOST, GATES = range(8)
+# Entries of `whole`: the addresses of the model's own step and functions, four sizes, 1 where the filter was lost.
+STEP, RATE, OUTPUT, STATES, INPUTS, OUTPUTS, PARAMETERS, LOST, GATES = range(9)
 
 
 def packed(
-    addresses: tuple[int, int], gates: Whole, x: Array, P: Array, linear: Array, p: Array, Q: Array, R: Array,
+    addresses: tuple[int, int, int], gates: Whole, x: Array, P: Array, linear: Array, p: Array, Q: Array, R: Array,
     angle: Array,
 ) -> tuple[Whole, Array]:  # fmt: skip
     """`whole` and `real` of a filter that has not seen a sample: x (n,), P, Q (n, n), R, angle (outputs,)."""
@@ -123,13 +123,13 @@ def next_sample(whole: Any, real: Any, now: float, u_now: Any, y_now: Any) -> No
     for c in range(ny):
         y[1, c] = y_now[c]
     work = rows[0], rows[1], rows[2], us, squares[0], Fp, squares[1], squares[2], squares[3]
-    own = Hp, rows[3], rows[4], squares[4], squares[5], squares[6], yv
+    own = Hp, rows[3], rows[4], squares[4], yv
     X = rows[5:7]
     Xp = rows[7:9]
     P = squares[7:9]
     failed = ekf(
-        _at(whole[RATE]), _at(whole[OUTPUT]), t, u, linear, y, Xp, Xp, 0, x, C, p, whole[GATES:], Q, 1, R, angle,
-        whole[0:0], work, own, X, P, Xp, squares[9:11], squares[11:13], squares[13:15], channels[0], channels[1],
+        whole[STEP], _at(whole[RATE]), _at(whole[OUTPUT]), t, u, linear, y, Xp, Xp, 0, x, C, p, whole[GATES:], Q, 1, R,
+        angle, whole[0:0], work, own, X, P, Xp, squares[9:11], squares[11:13], squares[13:15], channels[0], channels[1],
         seen[0], seen[1],
     )  # fmt: skip
     for c in range(ny):
