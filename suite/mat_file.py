@@ -11,7 +11,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from suite.columns import MOST, Array, Table, floats, refuse_many
+from suite.columns import MOST, Array, Table, floats, refuse_many, refuse_wide
 from suite.errors import DataError
 
 HEAD = 128  # bytes before the first variable of version 5
@@ -36,6 +36,8 @@ def read(file: Path) -> Table:
         for name, shape, kind in listed
         if len(shape) == 2 and 1 == min(shape) < max(shape) and kind in NUMBERS
     }
+
+    refuse_wide(file.name, len(vectors))
 
     def columns(wanted: Sequence[str]) -> dict[str, Array]:
         lengths = {name: vectors[name] for name in wanted}

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from suite.columns import MOST, Array, Table, floats, refuse_many
+from suite.columns import CONVERT, MOST, Array, Table, floats, mend, refuse_many, refuse_wide
 from suite.errors import DataError
 
 PIECE = 65_536  # rows read at a time
@@ -25,6 +25,8 @@ def read(file: Path) -> Table:
             names = tuple(schema.names)
     except (pa.ArrowException, OSError, MemoryError, UnicodeDecodeError, RecursionError):
         raise DataError(f"{file.name}: not a parquet file; write it again or save it as CSV") from None
+
+    refuse_wide(file.name, len(names))
 
     def columns(wanted: Sequence[str]) -> dict[str, Array]:
         kinds = {name: schema.field(name).type for name in dict.fromkeys(wanted)}
@@ -59,7 +61,7 @@ def _refuse_kind(file: str, name: str, kind: Any) -> None:
     if types.is_dictionary(kind):
         kind = kind.value_type
     if types.is_temporal(kind):
-        raise DataError(f"{file}, column {name}: holds dates; convert them to seconds from the start")
+        raise DataError(f"{file}, column {name}: holds dates; {CONVERT}")
     numbers = types.is_integer(kind) or types.is_floating(kind) or types.is_boolean(kind) or types.is_decimal(kind)
     if not (numbers or types.is_null(kind) or types.is_string(kind) or types.is_large_string(kind)):
         raise DataError(f"{file}, column {name}: holds {str(kind)[:60]}, expected numbers; save one number a row")
@@ -95,8 +97,7 @@ def _numbers(file: str, name: str, column: Any, first: int) -> Array:
         except (TypeError, ValueError, OverflowError):
             row = first + int(np.flatnonzero(at == place)[0]) + 1
             raise DataError(
-                f"{file}, row {row}, column {name}: expected a number, got {repr(cell)[:40]}; "
-                "correct it, or leave the cell empty if it is missing"
+                f"{file}, row {row}, column {name}: expected a number, got {repr(cell)[:40]}; {mend(str(cell)[:40])}"
             ) from None
     values[known] = numbers[back]
     return values

@@ -5,17 +5,28 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Iterable, Iterator
+from typing import TextIO
 
 import numpy as np
 import numpy.typing as npt
 
+from suite.columns import mend
 from suite.errors import DataError
 from suite.model import Model
 from suite.readers import there, time_column
-from suite.tables import DECIMAL_COMMA, MISSING, Table, separator
+from suite.tables import DECIMAL_COMMA, MISSING, TOLD, Table, separator
 
 Array = npt.NDArray[np.float64]
 Sample = tuple[float, Array, Array]
+LONGEST = 1 << 20  # characters of a line
+
+
+def lines_of(stream: TextIO, source: str) -> Iterator[str]:
+    """A stream's lines as they come. Raises DataError at one that does not end."""
+    for at, line in enumerate(iter(lambda: stream.readline(LONGEST), ""), 1):
+        if len(line) == LONGEST and not line.endswith("\n"):
+            raise DataError(f"{source}, line {at}: longer than {LONGEST} characters; put each sample on a line")
+        yield line
 
 
 def samples(lines: Iterable[str], model: Model, source: str) -> Iterator[Sample]:
@@ -25,9 +36,12 @@ def samples(lines: Iterable[str], model: Model, source: str) -> Iterator[Sample]
     """
     numbered = ((at, line) for at, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith("#"))
     found = next(numbered, None)
+    told = TOLD.match(found[1]) if found else None
+    if told:
+        found = next(numbered, None)
     if found is None:
         raise DataError(f"{source}: no lines; expected a line of column names, then a sample a line")
-    reader = _Reader(found[1], model, source)
+    reader = _Reader(found[1], model, source, told[1] if told else separator(found[1]))
     for at, line in numbered:
         sample = reader.sample(at, line)
         if sample is not None:
@@ -41,8 +55,8 @@ def _missing(cell: str) -> bool:
 class _Reader:
     """The columns, and what the last line said."""
 
-    def __init__(self, header: str, model: Model, source: str) -> None:
-        self.source, self.mark = source, separator(header)
+    def __init__(self, header: str, model: Model, source: str, mark: str) -> None:
+        self.source, self.mark = source, mark
         names = [name.strip() for name in self.cells(header)]
         while names and not names[-1]:
             names.pop()
@@ -62,7 +76,11 @@ class _Reader:
     def cells(self, line: str) -> list[str]:
         if '"' not in line:
             return line.rstrip("\r\n").split(self.mark)
-        return next(csv.reader([line.rstrip("\r\n")], delimiter=self.mark, skipinitialspace=True), [])
+        try:
+            return next(csv.reader([line.rstrip("\r\n")], delimiter=self.mark, skipinitialspace=True), [])
+        except csv.Error:
+            most = csv.field_size_limit()
+            raise DataError(f"{self.source}: a cell of more than {most} characters; close its quote") from None
 
     def sample(self, at: int, line: str) -> Sample | None:
         """The sample in line `at`, None where every cell is empty."""
@@ -106,9 +124,8 @@ class _Reader:
             value = math.nan
         if not math.isfinite(value):
             shown = text if len(text) <= 40 else text[:37] + "..."
-            mend = "correct it, or leave the cell empty if it is missing"
-            raise self.refuse(at, f"expected a number, got {shown!r}", mend, f", column {name}")
+            raise self.refuse(at, f"expected a number, got {shown!r}", mend(text), f", column {name}")
         return value
 
-    def refuse(self, at: int, what: str, mend: str, column: str = "") -> DataError:
-        return DataError(f"{self.source}, line {at}{column}: {what}; {mend}")
+    def refuse(self, at: int, what: str, advice: str, column: str = "") -> DataError:
+        return DataError(f"{self.source}, line {at}{column}: {what}; {advice}")

@@ -15,15 +15,18 @@ import numpy as np
 import numpy.typing as npt
 
 from suite import mat_file, parquet_file
-from suite.columns import Array, Table
+from suite.columns import Array, Table, mend, refuse_wide
 from suite.errors import DataError
 from suite.files import write_whole
+from suite.text_file import read_text
 
 __all__ = ["Table", "read_table", "write_csv"]
 
 # What pandas and people write for "nothing was measured here".
 MISSING = frozenset({"", "na", "n/a", "#n/a", "nan", "-nan", "null", "none", "<na>"})
 DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+([eE][+-]?\d+)?\s*\Z")
+# The line by which a spreadsheet is told the separator.
+TOLD = re.compile(r'"?sep=([,;\t])"?\s*\Z', re.IGNORECASE)
 
 
 def read_table(path: str | os.PathLike[str]) -> Table:
@@ -78,16 +81,24 @@ class _Text:
 
     def __init__(self, file: Path) -> None:
         self.name = file.name
-        self.text = _decoded(file)
+        self.text = read_text(file)
         head = self.text[:100_000].split("\n")
-        marks = 0
-        while marks < len(head) and (not head[marks].strip() or head[marks].lstrip().startswith("#")):
+        marks, told = 0, None
+        while marks < len(head):
+            found = TOLD.match(head[marks])
+            told = told or found
+            if not found and head[marks].strip() and not head[marks].lstrip().startswith("#"):
+                break
             marks += 1
         if marks == len(head):
             raise DataError(f"{self.name}: no rows; expected a line of column names and rows of numbers")
         # Some programs write the names as the last of the comment lines.
-        self.separator = separator(head[marks])
-        if marks and head[marks - 1].strip() and all(_is_number(cell) for cell in self.split(head[marks])):
+        self.separator = told[1] if told else separator(head[marks])
+        if (
+            marks
+            and head[marks - 1].lstrip().startswith("#")
+            and all(_is_number(cell) for cell in self.split(head[marks]))
+        ):
             marks -= 1
         # Lines before the names, counted from the file's start.
         self.skipped = marks
@@ -103,8 +114,9 @@ class _Text:
         if first is None:
             raise DataError(f"{self.name}: column names and no rows; add measurements")
         self.width = max(len(names), len(first))
+        refuse_wide(self.name, self.width)
         # Some numbers of a file may be whole, so one row is not enough to tell.
-        early = [cell for _, row in itertools.islice(self.rows(), 200) for cell in row]
+        early = [cell for _, row in itertools.islice(self.rows(), 200) for cell in row[: self.width]]
         comma = self.separator != "," and any(DECIMAL_COMMA.match(cell) for cell in early)
         self.decimal = "," if comma else "."
         self.refuse_wide(*next(self.rows()))
@@ -193,22 +205,9 @@ class _Text:
                 if not _is_number(cell.replace(self.decimal, ".")) and cell.lower() not in MISSING:
                     shown = cell if len(cell) <= 40 else cell[:37] + "..."
                     return DataError(
-                        f"{self.name}, line {line}, column {name}: expected a number, got {shown!r}; "
-                        "correct it, or leave the cell empty if it is missing"
+                        f"{self.name}, line {line}, column {name}: expected a number, got {shown!r}; {mend(cell)}"
                     )
         return DataError(f"{self.name}: not a table of numbers; check its separators and quotes")
-
-
-def _decoded(file: Path) -> str:
-    raw = file.read_bytes()
-    encoding = "utf-16" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"
-    try:
-        text = raw.decode(encoding)
-    except UnicodeDecodeError:
-        text = raw.decode("latin-1")
-    if "\0" in text:
-        raise DataError(f"{file.name}: not a text file; save the data as CSV, parquet or MAT with the right suffix")
-    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def separator(line: str) -> str:

@@ -16,7 +16,7 @@ from suite.errors import DataError, InputError
 from suite.model import Model
 from suite.model_file import read_model
 from suite.record import Record
-from suite.sample_lines import Sample, samples
+from suite.sample_lines import Sample, lines_of, samples
 from suite.watch import FALSE_ALARMS, Reading, Watcher
 
 FIRST, FIRST_BLIND = 40, 200  # samples to set up on: where the sensors' noise is stated, and where it is not
@@ -32,8 +32,8 @@ def run(args: argparse.Namespace) -> int:
     count = args.first or (FIRST_BLIND if blind else FIRST)
     source = "standard input" if args.data == "-" else args.data
     alarmed = False
-    with _opened(args.data) as lines:
-        coming = samples(lines, model, source)
+    with _opened(args.data) as stream:
+        coming = samples(lines_of(stream, source), model, source)
         first, broken = _first(coming, count, len(model.outputs))
         if broken is not None and len(first) < 2:
             raise broken

@@ -37,6 +37,19 @@ PATHS = (
     "/api",
     "//",
 )
+FOREIGN = ("null", "http://evil.example", "*")
+# Bodies that no sampling of values makes: deep, with numbers that JSON has not, with one key twice, too large.
+BODIES = (
+    b"[" * 200_000,
+    b'{"model":' * 100_000,
+    b'{"model": "", "data": ["x"], "values": {"c": NaN, "k": Infinity}}',
+    b'{"model": "", "model": 1, "data": "../../etc/passwd"}',
+    b'{"values": {"c": ' + b"9" * 100_000 + b"}}",
+    b'"\\ud800"',
+    b"\xff\xfe{",
+    b"#" * 1_100_000,
+    b"t,u,y\n" + b"0,1,2" * 250_000,
+)
 KEYS = ("model", "data", "values", "absolute", "name", "analyses")
 latin = st.text(st.characters(max_codepoint=255, blacklist_characters="\r\n\0"), max_size=30)
 headers = st.dictionaries(
@@ -45,7 +58,7 @@ headers = st.dictionaries(
     ),
     st.one_of(
         latin,
-        st.sampled_from(["null", "bytes=0-0,9-1", "application/json", "http://evil.example", "*", "100-continue"]),
+        st.sampled_from([*FOREIGN, "bytes=0-0,9-1", "application/json", "100-continue", ""]),
     ),
     max_size=2,
 )
@@ -65,8 +78,14 @@ def requests(draw: st.DrawFn) -> tuple[str, str, dict[str, str], bytes]:
     )
     sound = models().map(lambda text: {"model": text.decode("utf-8", "replace")[:20_000], "data": [], "values": {}})
     plain = st.one_of(fields, sound, st.just({"model": PLANT, "values": {"c": 1e400}, "data": ["x"]}))
-    body = st.one_of(plain.map(lambda thing: json.dumps(thing, default=str).encode()), tables(), st.binary(max_size=60))
-    return method, path, draw(headers), draw(body)[:900_000]
+    plain = st.one_of(plain, st.just({"name": "../../etc/passwd", "data": ["/etc/passwd"], "model": PLANT}))
+    body = st.one_of(
+        st.sampled_from(BODIES),
+        plain.map(lambda thing: json.dumps(thing, default=str).encode()),
+        tables(),
+        st.binary(max_size=60),
+    )
+    return method, path, draw(headers), draw(body)
 
 
 strategy = requests()
@@ -87,10 +106,11 @@ def _spent(process: int) -> float:
 
 def prepare(oracle: Oracle, folder: Path) -> Any:
     """A server of the page, and a cookie of it."""
-    said = (folder / "stderr").open("w+")
+    said, home = (folder / "stderr").open("w+"), folder / "home"
+    home.mkdir()
     command = [sys.executable, "-m", "suite", "serve", "--no-browser", "--port", "0"]
     server = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=said, text=True, env={**os.environ, "TMPDIR": str(folder)}
+        command, stdout=subprocess.PIPE, stderr=said, text=True, cwd=home, env={**os.environ, "TMPDIR": str(folder)}
     )
     assert server.stdout is not None
     address, _, token = server.stdout.readline().strip().partition("/?token=")
@@ -111,9 +131,9 @@ def prepare(oracle: Oracle, folder: Path) -> Any:
     def attempt(given: tuple[str, str, dict[str, str], bytes]) -> None:
         oracle.tried += 1
         method, path, more, body = given
-        before = _spent(server.pid)
+        before, sent = _spent(server.pid), {"origin": address, "cookie": cookie, **more}
         try:
-            status, text, _ = ask(method, path, {"origin": address, "cookie": cookie, **more}, body)
+            status, text, _ = ask(method, path, sent, body)
         except (http.client.HTTPException, OSError, ValueError) as error:
             if server.poll() is not None:
                 oracle.note("the server ended", repr(given), repr(error))
@@ -122,6 +142,8 @@ def prepare(oracle: Oracle, folder: Path) -> Any:
             return
         spent = _spent(server.pid) - before
         oracle.answers[f"status {status}"] += 1
+        if status < 300 and (sent["cookie"] != cookie or sent["origin"] in FOREIGN or "host" in sent):
+            oracle.note("a stranger was answered", repr(given), str(status))
         if path.partition("?")[0] not in SLOW:
             oracle.slowest = max(oracle.slowest, spent)
             if spent > 1.5:  # what the processes load beside is counted too
@@ -140,6 +162,8 @@ def prepare(oracle: Oracle, folder: Path) -> Any:
         server.wait(30)
         said.seek(0)
         heard = said.read()
+        if any(home.iterdir()):
+            oracle.note("a file where none was asked for", "", str(list(home.iterdir())))
         if "Traceback (" in heard or "failed" in heard:
             oracle.note("the server printed a failure", "", heard[-500:])
 
