@@ -19,10 +19,12 @@ from suite.model_effects import effects
 from suite.model_text import to_toml as to_toml
 from suite.units import check
 
-LARGEST = 250_000  # bytes; the largest of the package has some thousands
+LARGEST = 100_000  # bytes; the largest of the package has some thousands
 MOST_PARTS = 100  # of a dotted key, which is read in a time with the square of its parts
 QUOTED = re.compile(r"\"[^\"]*\"|'[^']*'|#.*")
 BETWEEN = re.compile(r"[^\w\-. \t]")
+MOST_ENTRIES = 1000  # of all tables and effects together
+MOST_LETTERS = 30_000  # of all equations together; 30 us each at worst
 TABLES = ("states", "parameters", "inputs", "outputs", "initial", "suspect", "units")
 KEYS = ("name", "time", *TABLES, "effects")
 
@@ -87,6 +89,13 @@ def _text(file: Path) -> str:
     return text
 
 
+def _letters(value: Any) -> int:
+    """The characters of all texts in a document."""
+    if isinstance(value, dict):
+        value = list(value.values())
+    return sum(map(_letters, value)) if isinstance(value, list) else len(value) if isinstance(value, str) else 0
+
+
 def _neighbour(file: Path) -> str:
     try:
         beside = [other.name for other in file.parent.glob("*.toml")]
@@ -105,6 +114,14 @@ class _Reader(Document):
     def model(self, document: Mapping[str, Any]) -> Model:
         self.known("", document, KEYS)
         tables = {name: self.table(document, name) for name in TABLES}
+        listed = document.get("effects", [])
+        count = sum(map(len, tables.values())) + (len(listed) if isinstance(listed, list) else 0)
+        if count > MOST_ENTRIES:
+            raise self.refuse("", f"{count} entries, at most {MOST_ENTRIES} are read", "model a part of the plant")
+        letters = _letters([tables["states"], tables["outputs"], listed])
+        if letters > MOST_LETTERS:
+            what = f"equations of {letters} characters, at most {MOST_LETTERS} are read together"
+            raise self.refuse("", what, "model a part of the plant")
         name = document.get("name", self.source.removesuffix(".toml"))
         model = Model(
             name=self.text("name", name, "driven oscillator"),

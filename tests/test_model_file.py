@@ -270,7 +270,7 @@ def test_files_that_are_no_model_files_are_refused(tmp_path: Path) -> None:
         "": "is a folder",
         "binary.toml": "not a text file",
         "empty.toml": "empty",
-        "large.toml": "larger than 250 kB",
+        "large.toml": "larger than 100 kB",
         "/dev/null": "not an ordinary file",
     }.items():
         with pytest.raises(ModelError, match=sentence):
