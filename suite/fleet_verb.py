@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import re
 import shlex
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,10 @@ from suite.errors import InputError
 
 LIMIT = 120.0
 STORE, TABLES, REPORT = "fleet.sqlite", ("fleet.parquet", "fleet.csv"), "report.html"
-WORST = 10
+ELSEWHERE = "name another folder with -o"
+# Machines and reasons that the terminal shows, and what it shows of a machine.
+WORST, REASONS = 10, 3
+SHOWN = ("file", "ratio", "verdict", "effects", "weight", "sentence")
 
 
 def add_arguments(verb: argparse.ArgumentParser) -> None:
@@ -25,12 +29,13 @@ def add_arguments(verb: argparse.ArgumentParser) -> None:
     fleet.add_argument("-o", "--output", type=Path, metavar="DIR", help="fleet.sqlite, .parquet, .csv and report.html")
     fleet.add_argument("--jobs", type=count, metavar="N", help="processes, default one a core")
     fleet.add_argument("--dask", metavar="ADDRESS", help="run on the Dask cluster whose scheduler is there")
-    fleet.add_argument("--limit", type=_seconds, metavar="SECONDS", help=f"time of one file at most, default {LIMIT:g}")
+    fleet.add_argument("--limit", type=seconds, metavar="SECONDS", help=f"time of one file at most, default {LIMIT:g}")
     fleet.add_argument("--memory", type=count, metavar="MIB", help="memory of one file at most, default 1024")
     fleet.add_argument("--force", action="store_true", help="run again what is stored and unchanged")
 
 
-def _seconds(text: str) -> float:
+def seconds(text: str) -> float:
+    """A time above zero; argparse calls a wrong one by this name."""
     value = float(text)
     if not 0 < value < math.inf:
         raise argparse.ArgumentTypeError(f"{text}: expected seconds above zero")
@@ -55,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     from suite.benchmark.store import Store
     from suite.benchmark.worker import MEMORY
     from suite.files import writable_folder
-    from suite.fleet import files, ranking
+    from suite.fleet import files, ranking, stored, tables
     from suite.fleet import run as fleet
     from suite.model_file import read_model
     from suite.report import fleet_page
@@ -67,19 +72,22 @@ def run(args: argparse.Namespace) -> int:
     chosen = files.chosen([str(path) for path in args.data], [folder / name for name in TABLES])
     writable_folder(folder)
     how = Driving(args.jobs, args.limit or LIMIT, args.memory or MEMORY, args.force, args.json, args.dask)
-    with Store(folder / STORE, elsewhere="name another folder with -o") as store:
+    parquet, text = (folder / name for name in TABLES)
+    with Store(folder / STORE, elsewhere=ELSEWHERE) as store:
         done = fleet.run(chosen, fleet.Asked(model, args.model.name, args.absolute), store, how)
-    rows = ranking.ranked(done.rows)
-    for name in TABLES:
-        table.write(rows, folder / name)
-    fleet_page.write(rows, model, _command(args), folder / REPORT)
-    told: dict[str, Any] = {"files": len(rows), "run": done.run, "unchanged": done.unchanged}
-    told |= ranking.summary(rows, WORST)
+        briefs = ranking.ranked(done.briefs)
+        tables.write(stored.rows(store, briefs), list(model.outputs), parquet, text)
+        first = list(stored.rows(store, ranking.judged(briefs)[: fleet_page.SHOWN]))
+    fleet_page.write(briefs, first, model, _command(args), folder / REPORT)
+    told: dict[str, Any] = {"files": len(briefs), "run": done.run, "unchanged": done.unchanged}
+    told |= ranking.summary(briefs)
+    told["worst"] = [{"rank": k + 1, **{name: row[name] for name in SHOWN}} for k, row in enumerate(first[:WORST])]
+    told["not_judged"] = ranking.failures(briefs)
     told["paths"] = [str(folder / name) for name in (STORE, *TABLES, REPORT)]
     if "ok" not in told["status"]:
-        first = rows[0]
+        one = briefs[0]
         raise InputError(
-            f"none of {len(rows)} files could be judged; the first, {first['file']}: {first['reason']}; "
+            f"none of {len(briefs)} files could be judged; the first, {one.file}: {one.reason}; "
             f"all reasons are in {folder / REPORT}"
         )
     if args.json:
@@ -108,9 +116,20 @@ def _say(told: dict[str, Any]) -> None:
     print(told["sentence"])
     status = ", ".join(f"{number} {name}" for name, number in sorted(told["status"].items()))
     print(f"{told['files']} files: {told['unchanged']} unchanged, {told['run']} run ({status})")
-    print("\nWorst, by error over noise:")
-    for row in told["worst"]:
+    if failing := [row for row in told["worst"] if row["verdict"] != "adequate"]:
+        print("\nWorst, by error over noise:")
+    for row in failing:
         what = plain(row["effects"]) or row["verdict"]
-        sure = "" if row["verdict"] in ("missing_effect", "adequate", "unexplained") else f" ({row['verdict']})"
+        sure = "" if row["verdict"] in ("missing_effect", "unexplained") else f" ({row['verdict']})"
         print(f"  {row['rank']:>4}  {ratio(row['ratio']):>8}  {row['file']}  {what}{sure}")
+    if told["not_judged"]:
+        print("\nNot judged:")
+    for entry in told["not_judged"][:REASONS]:
+        # A reason may be several lines, and most of them open with the file's name.
+        reason = " ".join(entry["reason"].split())
+        bare = re.sub(rf"^\S*{re.escape(Path(entry['file']).name)}", "", reason)
+        like = "" if entry["count"] == 1 else f" (the first of {entry['count']} alike)"
+        print(f"  {entry['file']}{like}{bare if bare != reason else f': {reason}'} ({entry['status']})")
+    if (more := len(told["not_judged"]) - REASONS) > 0:
+        print(f"  and {more} more kind{'' if more == 1 else 's'} of reason, in the report")
     print(f"\nReport: {told['paths'][-1]}\nTables: {', '.join(told['paths'][1:3])}")

@@ -5,36 +5,42 @@ from __future__ import annotations
 import math
 import os
 import re
+from bisect import bisect_left
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
-Row = Mapping[str, Any]
+from suite.fleet.stored import Brief
+
 FOLLOWS, UNEXPLAINED, FAILED = "follows the model", "fails, not in the library", "could not be judged"
 NAMED = 4  # effects that the sentence names one by one
 
 
-def ranked(rows: Iterable[Row]) -> list[dict[str, Any]]:
-    """The judged rows with their `rank`, then the others by name: the largest error over noise first, then weight."""
-    rows = list(rows)
-    judged = sorted((row for row in rows if row["status"] == "ok"), key=_first)
-    rest = sorted((row for row in rows if row["status"] != "ok"), key=lambda row: str(row["file"]))
-    return [{"rank": k + 1, **row} for k, row in enumerate(judged)] + [{"rank": None, **row} for row in rest]
+def ranked(briefs: Iterable[Brief]) -> list[Brief]:
+    """The judged files, then the others by name: the largest error over noise first, then weight."""
+    return sorted(briefs, key=_place)
 
 
-def _first(row: Row) -> tuple[float, float, str]:
-    return -row["ratio"], -row["weight"], str(row["file"])
+def _place(brief: Brief) -> tuple[bool, float, float, str]:
+    if brief.status != "ok":
+        return True, 0.0, 0.0, brief.file
+    return False, -brief.ratio, -brief.weight, brief.file
 
 
-def group(row: Row) -> tuple[str, bool]:
+def judged(ranking: Sequence[Brief]) -> Sequence[Brief]:
+    """Those with a verdict, which stand first."""
+    return ranking[: bisect_left(ranking, True, key=lambda brief: brief.status != "ok")]
+
+
+def group(brief: Brief) -> tuple[str, bool]:
     """What a machine lacks in words, and whether that is certain or only the most likely of several."""
-    if row["status"] != "ok":
+    if brief.status != "ok":
         return FAILED, True
-    if row["verdict"] == "adequate":
+    if brief.verdict == "adequate":
         return FOLLOWS, True
-    if row["verdict"] == "unexplained" or not row["effects"]:
+    if brief.verdict == "unexplained" or not brief.effects:
         return UNEXPLAINED, True
-    return plain(row["effects"]), row["verdict"] == "missing_effect"
+    return plain(brief.effects), brief.verdict == "missing_effect"
 
 
 def plain(effects: str) -> str:
@@ -42,22 +48,22 @@ def plain(effects: str) -> str:
     return effects.replace("@", " in ").replace(" + ", " and ")
 
 
-def counts(rows: Iterable[Row]) -> dict[str, tuple[int, int]]:
+def counts(briefs: Iterable[Brief]) -> dict[str, tuple[int, int]]:
     """Machines by what they lack, certain and most likely, the most frequent effect first; the other groups last."""
     found: dict[str, list[int]] = {}
-    for row in rows:
-        name, certain = group(row)
+    for brief in briefs:
+        name, certain = group(brief)
         found.setdefault(name, [0, 0])[0 if certain else 1] += 1
     order = sorted(found, key=lambda name: (name in (FOLLOWS, UNEXPLAINED, FAILED), -sum(found[name]), name))
     last = [name for name in (UNEXPLAINED, FOLLOWS, FAILED) if name in found]
     return {name: (found[name][0], found[name][1]) for name in [*(n for n in order if n not in last), *last]}
 
 
-def sentence(rows: Sequence[Row]) -> str:
+def sentence(briefs: Sequence[Brief]) -> str:
     """'Of 500 machines, 312 follow the model; 120 lack coulomb_friction in v; 9 could not be judged.'"""
-    table = counts(rows)
+    table = counts(briefs)
     effects = {name: count for name, count in table.items() if name not in (FOLLOWS, UNEXPLAINED, FAILED)}
-    total, right = len(rows), sum(table.get(FOLLOWS, (0, 0)))
+    total, right = len(briefs), sum(table.get(FOLLOWS, (0, 0)))
     certain = Counter({name: sure for name, (sure, _) in effects.items() if sure}).most_common()
     said = [f"{right or 'none'} {'follows' if right in (0, 1) else 'follow'} the model"]
     said += [f"{count} {_lack(count)} {name}" for name, count in certain[:NAMED]]
@@ -81,19 +87,17 @@ def _lack(count: int) -> str:
     return "lacks" if count == 1 else "lack"
 
 
-def failures(rows: Iterable[Row]) -> list[dict[str, Any]]:
+def failures(briefs: Iterable[Brief]) -> list[dict[str, Any]]:
     """The reasons why files were not judged, grouped where only names and numbers differ, most frequent first.
 
     The reason is that of the group's first file, verbatim.
     """
     groups: dict[tuple[str, str], dict[str, Any]] = {}
-    for row in rows:
-        if row["status"] != "ok":
-            file, reason = str(row["file"]), str(row["reason"])
-            shape = re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "#", _without_name(reason, file))
-            entry = groups.setdefault((row["status"], shape), {"status": row["status"], "count": 0, "reason": reason})
-            entry["count"] += 1
-            entry.setdefault("file", file)
+    for brief in briefs:
+        if brief.status != "ok":
+            shape = re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "#", _without_name(brief.reason, brief.file))
+            first = {"status": brief.status, "count": 0, "reason": brief.reason, "file": brief.file}
+            groups.setdefault((brief.status, shape), first)["count"] += 1
     return sorted(groups.values(), key=lambda entry: (-entry["count"], entry["status"], entry["reason"]))
 
 
@@ -102,17 +106,15 @@ def _without_name(reason: str, file: str) -> str:
     return re.sub(r"\S*" + re.escape(os.path.basename(file)), "", reason)
 
 
-def summary(rows: Sequence[Row], worst: int = 10) -> dict[str, Any]:
-    """The whole fleet in numbers, and its worst machines."""
-    judged = [row for row in rows if row["status"] == "ok"]
-    fields = ("rank", "file", "ratio", "verdict", "effects", "weight", "sentence")
-    effects = Counter(row["effects"] for row in judged if row["verdict"] == "missing_effect")
+def summary(ranking: Sequence[Brief]) -> dict[str, Any]:
+    """The whole fleet in numbers."""
+    told = judged(ranking)
+    effects = Counter(brief.effects for brief in told if brief.verdict == "missing_effect")
     return {
-        "sentence": sentence(rows),
-        "status": dict(Counter(row["status"] for row in rows)),
-        "verdicts": dict(Counter(row["verdict"] for row in judged)),
+        "sentence": sentence(ranking),
+        "status": dict(Counter(brief.status for brief in ranking)),
+        "verdicts": dict(Counter(brief.verdict for brief in told)),
         "effects": dict(effects.most_common()),
-        "worst": [{field: row[field] for field in fields} for row in judged[:worst]],
     }
 
 

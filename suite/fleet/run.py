@@ -21,11 +21,10 @@ from suite.benchmark.reservations import Reservations
 from suite.benchmark.store import Store
 from suite.benchmark.worker import Failure, Task
 from suite.fleet import one
+from suite.fleet.stored import Brief
+from suite.fleet.stored import briefs as stored_briefs
 from suite.model import Model
 from suite.model_file import to_toml
-
-# What identifies a stored row; "noise" is there the noise level of a cell of the benchmark.
-IDENTITY = ("case", "noise", "estimator", "variant", "seed", "key", "when")
 
 
 @dataclass(frozen=True)
@@ -44,6 +43,10 @@ class Keys:
         texts = sorted((path.name, path.read_text(encoding="utf-8")) for path in hashes.finding())
         effects = sorted(map(repr, plugins.effects().values()))
         self.common = _digest(to_toml(asked.model), texts, effects, suite.__version__, asked.absolute)
+
+    def place(self, path: str) -> str:
+        """The key of a file whatever is in it: what a run takes in hand."""
+        return _digest(self.common, path)
 
     def of(self, path: str, digest: str) -> str:
         """The key of a file with these bytes."""
@@ -65,53 +68,57 @@ def finished(stored: str | None, key: str, how: Driving) -> bool:
 
 @dataclass(frozen=True)
 class Done:
-    """How many files were run and how many were stored before, and the rows of all of them."""
+    """How many files were run and how many were stored before, and what ranks them, in no order."""
 
     run: int
     unchanged: int
-    rows: list[dict[str, Any]]
+    briefs: list[Brief]
 
 
 def run(files: Mapping[str, str], asked: Asked, store: Store, how: Driving) -> Done:
-    """Run the files (see `files.chosen`) that are new or changed, or all with `force`."""
+    """Run the files (see `files.chosen`) that are new or changed, or all with `force`.
+
+    Only files that have a row are read here, to see if they are what they were; all others are read where they run.
+    """
     since = time.time() if how.force else 0.0
     keys, text = Keys(asked), to_toml(asked.model)
-    wanted = {path: keys.of(path, one.digest(path)) for path in files}
+    # The keys of the rows that were asked for.
+    good: dict[str, str] = {}
+
+    def stands(path: str, kept: str | None) -> bool:
+        if kept is not None and kept == good.get(path):
+            return True
+        if kept is None or not finished(kept, keys.of(path, one.digest(path)), how):
+            return False
+        good[path] = kept
+        return True
+
     stored = {} if since else {cell.case: key for cell, key in store.keys().items()}
-    fresh = [path for path, key in wanted.items() if not finished(stored.get(path), key, how)]
+    fresh = [path for path in files if not stands(path, stored.get(path))]
+    del stored
     statuses: Counter[str] = Counter()
 
     def task(path: str) -> Task | None:
-        if finished(store.key(_cell(path), since), wanted[path], how):
+        # Another run may have done it meanwhile.
+        if stands(path, store.key(_cell(path), since)):
             return None
         return Task("suite.fleet.one:run", (text, asked.source, path, asked.absolute), path)
 
     def keep(done: Task, outcome: Any) -> tuple[str, str]:
-        path, taken = done.label, wanted[done.label]
+        path = done.label
         if isinstance(outcome, Failure):
             outcome = {**dict.fromkeys(one.TEXTS, ""), "status": outcome.status, "reason": outcome.reason}
-            key = unfinished(taken, how)
+            good[path] = unfinished(keys.of(path, one.digest(path)), how)
         else:
             # A file that was written to meanwhile is stored as what was read.
-            key = wanted[path] = keys.of(path, outcome.pop("digest"))
-        store.put(_cell(path), key, outcome)
+            good[path] = keys.of(path, outcome.pop("digest"))
+        store.put(_cell(path), good[path], outcome)
         statuses[outcome["status"]] += 1
-        return taken, Path(path).name
+        return keys.place(path), Path(path).name
 
     with Reservations(store) as held:
-        drive("files", [(wanted[path], partial(task, path)) for path in fresh], held, how, keep)
-    return Done(statuses.total(), len(files) - statuses.total(), _rows(files, wanted, store, how))
-
-
-def _rows(files: Mapping[str, str], wanted: Mapping[str, str], store: Store, how: Driving) -> list[dict[str, Any]]:
-    """The rows of these files as they are, under the names that they were given; not what else the store holds."""
-    found = []
-    for row in store.rows():
-        path = row["case"]
-        if path in files and finished(row["key"], wanted[path], how):
-            noise = {"noise": row["noise"]} if row["status"] == "ok" else {}
-            found.append({"file": files[path], **{k: v for k, v in row.items() if k not in IDENTITY}, **noise})
-    return found
+        drive("files", [(keys.place(path), partial(task, path)) for path in fresh], held, how, keep)
+    return Done(statuses.total(), len(files) - statuses.total(), stored_briefs(store, files, stands))
 
 
 def _cell(path: str) -> Cell:

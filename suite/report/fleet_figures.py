@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from suite.fleet.ranking import FAILED, FOLLOWS, UNEXPLAINED, counts, group, ratio
+from suite.fleet.ranking import FAILED, FOLLOWS, UNEXPLAINED, counts, group, judged, ratio
+from suite.fleet.stored import Brief
 from suite.report.bench_figures import decades
 from suite.report.canvas import BLUE, GREEN, GREY, INK, ORANGE, SKY, VERMILION, dressed, legend_below, new_figure
-
-Row = Mapping[str, Any]
 
 # Colour and marker of the most frequent effects; colour alone is not seen by all.
 LOOKS = ((VERMILION, "o"), (BLUE, "s"), (GREEN, "^"), (ORANGE, "D"), (SKY, "v"))
@@ -23,18 +21,18 @@ ALL = 150  # of the worst, all of which are drawn
 BARS = 14
 
 
-def bars(rows: Sequence[Row]) -> Figure:
+def bars(briefs: Sequence[Brief]) -> Figure:
     """Machines by what they lack, named and most likely."""
-    table = counts(rows)
+    table = counts(briefs)
     shown = dict(list(table.items())[:BARS]) if len(table) <= BARS else _shortened(table)
     lacking = sum(sum(pair) for name, pair in table.items() if name not in (FOLLOWS, FAILED))
     fig = new_figure(
-        f"{lacking} of {len(rows)} machines are not what the model says",
+        f"{lacking} of {len(briefs)} machines are not what the model says",
         "Bars, machines by what their model lacks: " + "; ".join(f"{n}: {_count(*pair)}" for n, pair in shown.items()),
         1.3 + 0.36 * len(shown),
     )
     ax = dressed(fig.subplots(), "machines", "")
-    looks = _looks(rows)
+    looks = _looks(briefs)
     for k, (name, (sure, likely)) in enumerate(shown.items()):
         color = GREY if name == FAILED else looks.get(name, OTHER)[0]
         ax.barh(k, sure, color=color, height=0.66)
@@ -68,38 +66,36 @@ def _shortened(table: Mapping[str, tuple[int, int]]) -> dict[str, tuple[int, int
     return {**dict(kept), f"{len(rest)} other kinds": together, **last}
 
 
-def _looks(rows: Sequence[Row]) -> dict[str, tuple[str, str]]:
+def _looks(briefs: Sequence[Brief]) -> dict[str, tuple[str, str]]:
     """Colour and marker of each group that has its own."""
-    effects = [name for name in counts(rows) if name not in (UNEXPLAINED, FOLLOWS, FAILED)]
+    effects = [name for name in counts(briefs) if name not in (UNEXPLAINED, FOLLOWS, FAILED)]
     return {**dict(zip(effects, LOOKS, strict=False)), UNEXPLAINED: APART, FOLLOWS: RIGHT}
 
 
-def ranking(rows: Sequence[Row]) -> Figure | None:
+def ranking(briefs: Sequence[Brief]) -> Figure | None:
     """Error over noise of every judged machine, the worst first; None where none was judged."""
-    judged = [row for row in rows if row["status"] == "ok"]
-    if not judged:
+    told = judged(briefs)
+    if not told:
         return None
-    kept = _kept(len(judged))
-    thinned = (
-        f" {len(kept)} of {len(judged)} are drawn, the worst {ALL} all of them." if len(kept) < len(judged) else ""
-    )
-    worst, middle = judged[0], judged[len(judged) // 2]
+    kept = _kept(len(told))
+    thinned = f" {len(kept)} of {len(told)} are drawn, the worst {ALL} all of them." if len(kept) < len(told) else ""
+    worst, middle = told[0], told[len(told) // 2]
     fig = new_figure(
-        f"The worst machine is {_times(worst['ratio'])}, the middle one {_times(middle['ratio'])}",
+        f"The worst machine is {_times(worst.ratio)}, the middle one {_times(middle.ratio)}",
         "Error of the calibrated model over the sensor noise, of each machine, the worst at the left; 1 is a model "
         f"that is right to the noise. Colour and marker say what is missing; hollow: likeliest of several.{thinned}",
         4.4,
     )
     ax = dressed(fig.subplots(), "machine, by rank", "error over noise, largest of its outputs")
     ax.set_yscale("log")
-    finite = [row["ratio"] for row in judged if np.isfinite(row["ratio"]) and row["ratio"] > 0]
+    finite = [brief.ratio for brief in told if 0 < brief.ratio < np.inf]
     top = 2.0 * max(finite, default=1.0)
-    looks = _looks(rows)
+    looks = _looks(briefs)
     members: dict[tuple[tuple[str, str], str, bool], list[tuple[int, float]]] = {}
     for k in kept:
-        name, certain = group(judged[k])
+        name, certain = group(told[k])
         label = name if name in looks else "another effect"
-        at = (k + 1, min(max(judged[k]["ratio"], 1e-3), top))
+        at = (k + 1, min(max(told[k].ratio, 1e-3), top))
         members.setdefault((looks.get(name, OTHER), label, certain), []).append(at)
     for ((color, marker), label, certain), points in sorted(members.items(), key=lambda item: not item[0][2]):
         face = color if certain else "none"
@@ -108,7 +104,7 @@ def ranking(rows: Sequence[Row]) -> Figure | None:
     ax.axhline(1.0, color=INK, linewidth=0.9)
     ax.annotate("the noise", (1.0, 1.0), (-4, 3), xycoords=("axes fraction", "data"), textcoords="offset points",
                 ha="right", fontsize=9)  # fmt: skip
-    _ran_away(ax, judged, top)
+    _ran_away(ax, told, top)
     decades(ax.yaxis)
     legend_below(fig, ax)
     return fig
@@ -126,9 +122,9 @@ def _times(value: float) -> str:
     return "not simulated to its end" if np.isinf(value) else f"{ratio(value)} times the noise off"
 
 
-def _ran_away(ax: Axes, judged: Sequence[Row], top: float) -> None:
+def _ran_away(ax: Axes, told: Sequence[Brief], top: float) -> None:
     """Say which points stand at the upper edge for what has no number."""
-    lost = sum(1 for row in judged if np.isinf(row["ratio"]))
+    lost = sum(np.isinf(brief.ratio) for brief in told)
     if lost:
         ax.axhline(top, color=GREY, linestyle=":", linewidth=0.9)
         ax.annotate(f"{lost} ran away in simulation", (1.0, top), (-4, -12), xycoords=("axes fraction", "data"),

@@ -15,6 +15,7 @@ from suite import __version__
 from suite.discovery import words
 from suite.files import write_whole
 from suite.fleet import ranking
+from suite.fleet.stored import Brief
 from suite.model import Model
 from suite.report import fleet_figures
 from suite.report.vector import share_letters, svg
@@ -24,8 +25,13 @@ SHOWN = 200  # machines in the table of the page
 REASONS = 60  # kinds of failure on the page
 
 
-def write(rows: Sequence[Row], model: Model, command: str, path: Path, date: str = "") -> None:
-    """Write the page of ranked rows; `command` is the line that repeats the run, `date` today if empty."""
+def write(
+    briefs: Sequence[Brief], first: Sequence[Row], model: Model, command: str, path: Path, date: str = ""
+) -> None:
+    """Write the page of a ranking and the whole rows of its first judged files, SHOWN at most.
+
+    `command` is the line that repeats the run, `date` today if empty.
+    """
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
         autoescape=True,
@@ -33,21 +39,22 @@ def write(rows: Sequence[Row], model: Model, command: str, path: Path, date: str
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    figures = {"bars": fleet_figures.bars(rows), "ranking": fleet_figures.ranking(rows)}
+    figures = {"bars": fleet_figures.bars(briefs), "ranking": fleet_figures.ranking(briefs)}
     drawn = {name: figure for name, figure in figures.items() if figure is not None}
     shared, letters = share_letters({name: svg(figure, name) for name, figure in drawn.items()})
-    judged = [row for row in rows if row["status"] == "ok"]
     page = environment.get_template("fleet.html.j2").render(
         model=model.name,
         outputs=list(model.outputs),
-        sentence=ranking.sentence(rows),
+        sentence=ranking.sentence(briefs),
         letters=Markup(letters),
         figures={name: Markup(text) for name, text in shared.items()},
         says={name: str(figure.get_label()) for name, figure in drawn.items()},
-        rows=[_line(row) for row in judged[:SHOWN]],
-        judged=len(judged),
-        files=len(rows),
-        failures=ranking.failures(rows),
+        rows=[
+            _line(brief, row) | {"rank": str(k + 1)} for k, (brief, row) in enumerate(zip(briefs, first, strict=False))
+        ],
+        judged=len(ranking.judged(briefs)),
+        files=len(briefs),
+        failures=ranking.failures(briefs),
         reasons=REASONS,
         command=command,
         version=__version__,
@@ -56,16 +63,15 @@ def write(rows: Sequence[Row], model: Model, command: str, path: Path, date: str
     write_whole(path, page)
 
 
-def _line(row: Row) -> dict[str, str]:
+def _line(brief: Brief, row: Row) -> dict[str, str]:
     """A machine as a line of the table."""
-    name, certain = ranking.group(row)
+    name, certain = ranking.group(brief)
     return {
-        "rank": str(row["rank"]),
-        "file": str(row["file"]),
-        "ratio": ranking.ratio(row["ratio"]),
+        "file": brief.file,
+        "ratio": ranking.ratio(brief.ratio),
         "missing": name if certain else f"most likely {name}",
         "others": "" if certain else str(row["plausible"]),
-        "weight": words.weight(row["weight"]) if row["effects"] else "",
+        "weight": words.weight(brief.weight) if brief.effects else "",
         "coefficients": _coefficients(str(row["coefficients"])),
     }
 
