@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import math
 import multiprocessing
+import queue
 import sys
 import threading
 import time
@@ -26,6 +28,8 @@ from suite.errors import InputError
 
 # Tasks sent per thread of the cluster: one to run and one to follow it at once.
 AHEAD = 2
+# How often the cluster is asked for its size, in seconds.
+ASK = 1.0
 CONNECT = 10.0
 PACKAGES = ("suite", "estimators", "baselines", "cases", "effects")
 
@@ -73,14 +77,14 @@ def _results(
     client: Any, address: str, tasks: Iterable[Task | None], limit: float, memory: float
 ) -> Iterator[tuple[Task, Any]]:
     """Keep every thread of the cluster, as large as it is now, supplied; hand over what is finished."""
-    from distributed import wait
-
     source, ours, run_name = iter(tasks), fingerprint(), uuid.uuid4().hex[:8]
     sent: dict[Any, Task] = {}
-    more, count = True, 0
+    done: queue.SimpleQueue[Any] = queue.SimpleQueue()
+    more, count, threads, asked = True, 0, 1, -math.inf
     try:
         while more or sent:
-            threads = max(1, sum(client.nthreads().values())) if more else 0
+            if more and time.monotonic() > asked + ASK:
+                threads, asked = max(1, sum(client.nthreads().values())), time.monotonic()
             while more and len(sent) < AHEAD * threads:
                 task = next(source, _END)
                 more = task is not _END
@@ -88,18 +92,12 @@ def _results(
                     break
                 count += 1
                 key = f"cell-{run_name}-{count}"
-                sent[client.submit(answer, task, limit, memory, ours, key=key, pure=False)] = task
-            if not sent:
-                time.sleep(WATCH)
-                continue
-            try:
-                finished: Any = wait(list(sent), timeout=WATCH if more else None, return_when="FIRST_COMPLETED")
-            except TimeoutError:
-                continue
-            for future in finished.done:
-                task = sent.pop(future)
-                yield task, _outcome(future, address)
+                future = client.submit(answer, task, limit, memory, ours, key=key, pure=False)
+                sent[future] = task
+                future.add_done_callback(done.put)
+            for future, outcome in _outcomes(client, _finished(done), address):
                 future.release()
+                yield sent.pop(future), outcome
     finally:
         with contextlib.suppress(Exception):
             client.cancel(list(sent), force=True)
@@ -108,8 +106,26 @@ def _results(
 _END: Any = object()
 
 
-def _outcome(future: Any, address: str) -> Any:
-    """A task's result; a Failure where it took its workers with it."""
+def _finished(done: queue.SimpleQueue[Any]) -> list[Any]:
+    """All that has finished by now, after a moment's waiting for the first."""
+    found = []
+    with contextlib.suppress(queue.Empty):
+        found.append(done.get(timeout=WATCH))
+        while True:
+            found.append(done.get_nowait())
+    return found
+
+
+def _outcomes(client: Any, futures: list[Any], address: str) -> Iterator[tuple[Any, Any]]:
+    """Each future with its task's result, or a Failure where the task took its workers with it."""
+    # One request for all: alone, each would cost more than the rest of a task's way.
+    ready = [future for future in futures if future.status == "finished"]
+    results = dict(zip(ready, client.gather(ready), strict=True))
+    for future in futures:
+        yield future, results[future] if future in results else _failure(future, address)
+
+
+def _failure(future: Any, address: str) -> Failure:
     from distributed import KilledWorker
 
     if future.status == "cancelled" or future.status == "lost":
@@ -119,9 +135,7 @@ def _outcome(future: Any, address: str) -> Any:
         return Failure("error", "every Dask worker that ran it was lost, until Dask gave up")
     if isinstance(error, InputError):
         raise error
-    if error is not None:
-        return Failure("error", f"{type(error).__name__}: {error}")
-    return future.result()
+    return Failure("error", f"{type(error).__name__}: {error}")
 
 
 _own = threading.local()
