@@ -47,9 +47,8 @@ repeated = st.tuples(
     st.sampled_from(["", "x", "1"]),
     st.sampled_from(["", ")"]),
 ).map(lambda parts: parts[0] * (parts[1] // len(parts[0])) + parts[2] + parts[3] * (parts[1] // len(parts[0])))
-strategy = st.one_of(
-    st.recursive(sound, _grown, max_leaves=25), st.recursive(leaves, _grown, max_leaves=12), repeated, st.text()
-)
+grown = st.recursive(sound, _grown, max_leaves=25)
+strategy = st.one_of(grown, st.recursive(leaves, _grown, max_leaves=12), repeated, st.text())
 
 
 def prepare(oracle: Oracle, folder: Any) -> Any:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import tomli_w
+from expression import grown
 from expression import strategy as equations
 from hypothesis import strategies as st
 from mutations import bytewise, structural, textwise
@@ -66,6 +67,18 @@ dimension = "1"
 family = "memory"
 least = -1.0
 """
+# Without units, which most equations would not agree with.
+SOUND = """[states]
+x = "{}"
+v = "{}"
+[parameters]
+k = {}
+c = {{ value = 0.5, sd = {} }}
+[inputs]
+u = "u"
+[outputs]
+x = "{}"
+"""
 SEEDS = (PLANT, EFFECTS)
 KEYS = (
     "name", "time", "states", "parameters", "inputs", "outputs", "initial", "suspect", "units", "effects", "value",
@@ -106,10 +119,13 @@ def _dumped(document: Any) -> bytes:
 @st.composite
 def files(draw: st.DrawFn) -> bytes:
     seed = draw(st.sampled_from(SEEDS))
-    match draw(st.sampled_from(["structure", "structure", "text", "bytes", "noise", "large"])):
+    match draw(st.sampled_from(["structure", "structure", "sound", "sound", "text", "bytes", "noise", "large"])):
         case "structure":
             texts = st.one_of(equations, UNITS)
             return _dumped(draw(structural(tomllib.loads(seed), KEYS, texts)))
+        case "sound":
+            number = st.floats(1e-3, 1e3)
+            return SOUND.format(draw(grown), draw(grown), draw(number), draw(number), draw(grown)).encode()
         case "text":
             return draw(textwise(seed, PIECES)).encode("utf-8", "surrogatepass")
         case "bytes":

@@ -27,7 +27,8 @@ from suite.errors import LONGEST, InputError
 SECONDS = 1.0  # of processor time
 MEMORY = 400_000  # KiB by which one call may raise the process's peak
 LIMIT = 6 * 2**30  # bytes of address space: above it MemoryError, so that a bomb ends the call and not the machine
-PATIENCE = 15  # seconds of the clock, after which a call is broken off
+PATIENCE = 15  # seconds of processor time, after which a call is broken off
+WAIT = 600  # seconds of the clock, after which the process is ended: on a busy machine they are long
 CANARY = "fuzz_canary"
 # Loading Python's own modules on the way is no access to a file that somebody named.
 HOMES = tuple(
@@ -85,7 +86,7 @@ class Oracle:
         setattr(builtins, CANARY, Tripwire())
         resource.setrlimit(resource.RLIMIT_AS, (LIMIT, resource.RLIM_INFINITY))
         sys.addaudithook(self._audit)
-        signal.signal(signal.SIGALRM, _broken_off)
+        signal.signal(signal.SIGPROF, _broken_off)
 
     def _audit(self, event: str, arguments: tuple[Any, ...]) -> None:
         if not self._armed:
@@ -104,15 +105,15 @@ class Oracle:
     def _watched(self, allowed: tuple[Path, ...]) -> Iterator[None]:
         self._allowed, self._seen = tuple(os.path.realpath(path) for path in allowed), []
         Tripwire.touched = False
-        signal.alarm(PATIENCE)
-        # Where C code does not return to Python, the alarm is not heard.
-        faulthandler.dump_traceback_later(4 * PATIENCE, exit=True)
+        signal.setitimer(signal.ITIMER_PROF, PATIENCE)
+        # Where C code does not return to Python, the alarm is not heard; nor is it where nothing is computed.
+        faulthandler.dump_traceback_later(WAIT, exit=True)
         self._armed = True
         try:
             yield
         finally:
             self._armed = False
-            signal.alarm(0)
+            signal.setitimer(signal.ITIMER_PROF, 0)
             faulthandler.cancel_dump_traceback_later()
 
     def check(self, call: Callable[[], Any], given: str | bytes, *allowed: Path) -> Any:

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from model import PLANT
 from model import files as models
 from mutations import values, words
-from oracle import Oracle
+from oracle import WAIT, Oracle
 
 from suite.web.routes import ROUTES
 
@@ -117,7 +117,7 @@ def prepare(oracle: Oracle, folder: Path) -> Any:
     port = int(address.rpartition(":")[2])
 
     def ask(method: str, path: str, sent: dict[str, str], body: bytes) -> tuple[int, bytes, Any]:
-        connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
+        connection = http.client.HTTPConnection("127.0.0.1", port, timeout=WAIT)
         try:
             connection.request(method, path, body, sent)
             answer = connection.getresponse()
@@ -159,7 +159,7 @@ def prepare(oracle: Oracle, folder: Path) -> Any:
 
     def close() -> None:
         server.send_signal(signal.SIGINT)
-        server.wait(30)
+        server.wait(WAIT)
         said.seek(0)
         heard = said.read()
         if any(home.iterdir()):
