@@ -26,17 +26,28 @@ import pandas as pd
 from machines import KINDS, SAMPLES, mixed, write
 
 from suite.benchmark import cluster, pool
+from suite.benchmark.store import Store
 from suite.benchmark.worker import Task
 from suite.files import write_whole
 
-FEW = "machine-0000?.csv"
+FEW = "logs/machine-0000?.csv"
 
-# Runs the command line and leaves in the file at argv[1] what it took: of this process and of those it started.
+# Runs the command line and leaves in the file at argv[1] what it took: of this process and of those it started. Where
+# argv[2] is a row, it stands for the verdict of every file, and only the parent works.
 PROBE = """
 import json, resource, sys, time
 from suite.__main__ import main
+from suite.benchmark import pool
+
+def at_once(tasks, *_):
+    for task in tasks:
+        yield task, {**row, "digest": "that of the row"}
+
+if sys.argv[2]:
+    row = json.loads(sys.argv[2])
+    pool.run = at_once
 began = time.monotonic()
-code = main(sys.argv[2:])
+code = main(sys.argv[3:])
 own, workers = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
 taken = {
     "wall_s": time.monotonic() - began, "parent_cpu_s": own.ru_utime + own.ru_stime, "parent_mib": own.ru_maxrss / 1024,
@@ -48,27 +59,23 @@ sys.exit(code)
 """
 
 
-def judged(folder: Path, out: Path, pattern: str, jobs: int) -> dict[str, float]:
-    """What `unmodelled diagnose --each` takes for the logs that are like a pattern."""
-    words = [
-        "diagnose",
-        folder / "model.toml",
-        folder / "logs" / pattern,
-        "--each",
-        "-o",
-        out,
-        "--jobs",
-        jobs,
-        "--json",
-    ]
-    out.mkdir(parents=True, exist_ok=True)
-    taken = out / "taken.json"
-    command = [sys.executable, "-c", PROBE, str(taken), *map(str, words)]
+def judged(folder: Path, out: str, pattern: str, jobs: int, row: str = "") -> dict[str, float]:
+    """What `unmodelled diagnose --each` takes for the files of the folder that are like a pattern."""
+    place = folder / out
+    place.mkdir(parents=True, exist_ok=True)
+    words = ["diagnose", folder / "model.toml", folder / pattern, "--each", "-o", place, "--jobs", jobs, "--json"]
+    command = [sys.executable, "-c", PROBE, str(place / "taken.json"), row, *map(str, words)]
     # --json is silent on the way, as a run in the background is.
-    with (out / "said.json").open("w", encoding="utf-8") as said:
+    with (place / "said.json").open("w", encoding="utf-8") as said:
         subprocess.run(command, check=True, stdout=said)
-    found: dict[str, float] = json.loads(taken.read_text(encoding="utf-8"))
+    found: dict[str, float] = json.loads((place / "taken.json").read_text(encoding="utf-8"))
     return found
+
+
+def a_row(store: Path) -> str:
+    """The longest row of a store."""
+    with Store(store) as held:
+        return max((str(text) for (text,) in held.all("SELECT row FROM cells")), key=len)
 
 
 def in_processes(count: int) -> dict[str, float]:
@@ -174,32 +181,39 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--files", type=int, default=200, help="machines, default 200")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes, default one a core")
+    parser.add_argument("--rows", type=int, default=10000, help="files of the parent's measure, default 10000")
     parser.add_argument("--tasks", type=int, default=6000, help="empty tasks that tell the overhead, default 6000")
     parser.add_argument("--threads", type=int, default=1000, help="threads of the Dask cluster of these, default 1000")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="the fleet and what comes out")
     parser.add_argument("--results", type=Path, metavar="DIR", help="folder of throughput.json, default that of -o")
     args = parser.parse_args()
-    folder, out = args.output, args.output / "out"
+    folder, jobs = args.output, args.jobs
     kinds = mixed(args.files, seed=1)
     write(folder, kinds, seed=1)
 
-    judged(folder, folder / "first", FEW, args.jobs)  # compiles the model, for this machine and once
-    few = judged(folder, folder / "few", FEW, args.jobs)
-    all_ = judged(folder, out, "*.csv", args.jobs)
-    again = judged(folder, out, "*.csv", args.jobs)
-    more = args.files - len(list((folder / "logs").glob(FEW)))
+    judged(folder, "first", FEW, jobs)  # compiles the model, for this machine and once
+    few = judged(folder, "few", FEW, jobs)
+    all_ = judged(folder, "out", "logs/*.csv", jobs)
+    again = judged(folder, "out", "logs/*.csv", jobs)
+    more = args.files - len(list(folder.glob(FEW)))
     taken, unchanged = a_file(few, all_, more), a_file(few, again, more)
+
+    (folder / "names").mkdir(exist_ok=True)
+    for k in range(args.rows):
+        (folder / "names" / f"machine-{k:07d}.csv").touch()
+    row = a_row(folder / "few" / "fleet.sqlite")
+    alone = judged(folder, "one", "names/machine-0000000.csv", jobs, row)
+    parent = a_file(alone, judged(folder, "rows", "names/*.csv", jobs, row), args.rows - 1)
     processes, dask = in_processes(args.tasks), on_dask(args.tasks, args.threads)
 
+    out = folder / "rows"
     each = {
         "verdict_cpu_s": taken["workers_cpu_s"],
-        "parent_cpu_s": taken["parent_cpu_s"],
-        "parent_kib": 1024 * taken["parent_mib"],
+        "store_cpu_s": parent["parent_cpu_s"],
+        "parent_kib": 1024 * parent["parent_mib"],
+        "store_kib": (out / "fleet.sqlite").stat().st_size / args.rows / 1024,
         "task_wall_s": processes["wall_s"],
         "task_cpu_s": processes["parent_cpu_s"],
-        # Without what hands tasks to processes: reservation, row, progress, table, ranking.
-        "store_cpu_s": taken["parent_cpu_s"] - processes["parent_cpu_s"],
-        "store_kib": (out / "fleet.sqlite").stat().st_size / args.files / 1024,
         "dask_client_cpu_s": dask["client_cpu_s"],
         "dask_scheduler_cpu_s": dask["scheduler_cpu_s"],
         "unchanged_cpu_s": unchanged["parent_cpu_s"],
@@ -213,16 +227,19 @@ def main() -> None:
         "machine": machine(),
         "files": args.files,
         "samples": SAMPLES,
-        "jobs": args.jobs,
+        "jobs": jobs,
         "files_per_s": args.files / all_["wall_s"],
+        # Below `jobs`: other work shared the machine, and files_per_s is that much too low.
+        "cores_got": (all_["workers_cpu_s"] + all_["parent_cpu_s"]) / all_["wall_s"],
         "run": all_,
         "run_of_few": few,
         "run_unchanged": again,
         "each": each,
         "dask_threads": args.threads,
-        "bytes": sizes,
+        "rows": args.rows,
+        "bytes_of_rows": sizes,
         "million": million(each),
-        "verdicts": right(out, kinds),
+        "verdicts": right(folder / "out", kinds),
     }
     write_whole((args.results or folder) / "throughput.json", json.dumps(found, indent=1) + "\n")
     print(json.dumps(found, indent=1))
