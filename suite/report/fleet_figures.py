@@ -81,7 +81,7 @@ def ranking(briefs: Sequence[Brief]) -> Figure | None:
     thinned = f" {len(kept)} of {len(told)} are drawn, the worst {ALL} all of them." if len(kept) < len(told) else ""
     worst, middle = told[0], told[len(told) // 2]
     fig = new_figure(
-        f"The worst machine is {_times(worst.ratio)}, the middle one {_times(middle.ratio)}",
+        f"Worst machine: {_times(worst.ratio)}; middle one: {_times(middle.ratio)}",
         "Error of the calibrated model over the sensor noise, of each machine, the worst at the left; 1 is a model "
         f"that is right to the noise. Colour and marker say what is missing; hollow: likeliest of several.{thinned}",
         4.4,
@@ -119,7 +119,7 @@ def _kept(count: int) -> list[int]:
 
 
 def _times(value: float) -> str:
-    return "not simulated to its end" if np.isinf(value) else f"{ratio(value)} times the noise off"
+    return "runs away in simulation" if np.isinf(value) else f"{ratio(value)} times the noise"
 
 
 def _ran_away(ax: Axes, told: Sequence[Brief], top: float) -> None:
