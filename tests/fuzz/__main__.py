@@ -62,6 +62,8 @@ def run(target: str, seconds: float, examples: int | None, seed: int) -> dict[st
 
 def guided(target: str, seconds: float, report: Path) -> None:
     """One target by atheris, whose process ends with it: the report is written as it goes."""
+    # What atheris has put its counters into numba cannot compile; the readers need none of it.
+    os.environ["NUMBA_DISABLE_JIT"] = "1"
     import atheris
 
     with atheris.instrument_imports(include=PACKAGES):
