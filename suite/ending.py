@@ -68,6 +68,14 @@ def _unraisable(what: Any) -> None:
         return
     number = signal.SIGINT if issubclass(what.exc_type, KeyboardInterrupt) else signal.SIGTERM
     signal.signal(number, _stop)
-    later = threading.Timer(AGAIN, signal.raise_signal, (number,))
+    later = threading.Timer(AGAIN, _send, (number,))
     later.daemon = True
     later.start()
+
+
+def _send(number: int) -> None:
+    """To the main thread, which may be asleep."""
+    if sys.platform == "win32":
+        signal.raise_signal(number)
+    else:
+        signal.pthread_kill(threading.main_thread().ident or 0, number)
