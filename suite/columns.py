@@ -48,6 +48,13 @@ def refuse_wide(file: str, columns: int) -> None:
         )
 
 
+def joined(parts: list[Array]) -> Array:
+    """The pieces of a column as one; they are let go."""
+    whole = np.concatenate(parts) if parts else np.empty(0)
+    parts.clear()
+    return whole
+
+
 def mend(cell: str) -> str:
     """What to do about a cell that is no number."""
     return CONVERT if DATE.match(cell) else "correct it, or leave the cell empty if it is missing"

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from suite.columns import CONVERT, MOST, Array, Table, floats, mend, refuse_many, refuse_wide
+from suite.columns import CONVERT, MOST, Array, Table, floats, joined, mend, refuse_many, refuse_wide
 from suite.errors import DataError
 
 PIECE = 65_536  # rows read at a time
@@ -76,7 +76,7 @@ def _joined(file: str, names: Sequence[str], pieces: Any) -> dict[str, Array]:
         rows += piece.num_rows
         # The head of a damaged file may say less than comes.
         refuse_many(file, rows, len(names))
-    return {name: np.concatenate(parts) if parts else np.empty(0) for name, parts in found.items()}
+    return {name: joined(parts) for name, parts in found.items()}
 
 
 def _numbers(file: str, name: str, column: Any, first: int) -> Array:

@@ -15,16 +15,17 @@ import numpy as np
 import numpy.typing as npt
 
 from suite import mat_file, parquet_file
-from suite.columns import Array, Table, mend, refuse_wide
+from suite.columns import Array, Table, joined, mend, refuse_wide
 from suite.errors import DataError
 from suite.files import write_whole
-from suite.text_file import read_text
+from suite.text_file import text_of
 
 __all__ = ["Table", "read_table", "write_csv"]
 
 # What pandas and people write for "nothing was measured here".
 MISSING = frozenset({"", "na", "n/a", "#n/a", "nan", "-nan", "null", "none", "<na>"})
 DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+([eE][+-]?\d+)?\s*\Z")
+CELLS = 1 << 20  # of a table that are read at a time
 # The line by which a spreadsheet is told the separator.
 TOLD = re.compile(r'"?sep=([,;\t])"?\s*\Z', re.IGNORECASE)
 
@@ -81,8 +82,9 @@ class _Text:
 
     def __init__(self, file: Path) -> None:
         self.name = file.name
-        self.text = read_text(file)
-        head = self.text[:100_000].split("\n")
+        self.text = text_of(file)
+        with self.text.opened() as handle:
+            head = handle.read(100_000).split("\n")
         marks, told = 0, None
         while marks < len(head):
             found = TOLD.match(head[marks])
@@ -97,12 +99,12 @@ class _Text:
         if (
             marks
             and head[marks - 1].lstrip().startswith("#")
-            and all(_is_number(cell) for cell in self.split(head[marks]))
+            and all(_is_number(cell) for cell in self.split(head[marks], marks + 1))
         ):
             marks -= 1
         # Lines before the names, counted from the file's start.
         self.skipped = marks
-        names = [name.strip() for name in self.split(head[marks].lstrip("# "))]
+        names = [name.strip() for name in self.split(head[marks].lstrip("# "), marks + 1)]
         while names and not names[-1]:
             names.pop()
         self.names = names
@@ -121,11 +123,11 @@ class _Text:
         self.decimal = "," if comma else "."
         self.refuse_wide(*next(self.rows()))
 
-    def split(self, line: str) -> list[str]:
+    def split(self, line: str, at: int) -> list[str]:
         try:
             return next(csv.reader([line.rstrip("\r")], delimiter=self.separator, skipinitialspace=True), [])
         except csv.Error:
-            raise self.long(1 + self.text[: self.text.find(line)].count("\n")) from None
+            raise self.long(at) from None
 
     def long(self, line: int) -> DataError:
         """The sentence for what the csv module does not read: a cell of more than 131,072 characters."""
@@ -135,16 +137,17 @@ class _Text:
 
     def rows(self) -> Iterator[tuple[int, list[str]]]:
         """Rows that hold something, each with its line number."""
-        reader = csv.reader(io.StringIO(self.text), delimiter=self.separator, skipinitialspace=True)
-        while True:
-            try:
-                row = next(reader)
-            except StopIteration:
-                return
-            except csv.Error:
-                raise self.long(reader.line_num) from None
-            if reader.line_num > self.skipped + 1 and not all(cell.strip().lower() in MISSING for cell in row):
-                yield reader.line_num, row
+        with self.text.opened() as handle:
+            reader = csv.reader(handle, delimiter=self.separator, skipinitialspace=True)
+            while True:
+                try:
+                    row = next(reader)
+                except StopIteration:
+                    return
+                except csv.Error:
+                    raise self.long(reader.line_num) from None
+                if reader.line_num > self.skipped + 1 and not all(cell.strip().lower() in MISSING for cell in row):
+                    yield reader.line_num, row
 
     def refuse_wide(self, line: int, row: list[str]) -> None:
         if any(cell.strip() for cell in row[len(self.names) :]):
@@ -164,33 +167,40 @@ class _Text:
         return f"row {row + 1}"
 
     def read(self, columns: Sequence[str]) -> dict[str, Array]:
+        """The columns, of which alone every piece of the rows leaves something."""
         import pandas as pd
 
         wanted = [self.names.index(name) for name in columns]
         # Every digit counts; newer versions read them all without being asked, and warn when asked.
         exact: Any = {} if int(pd.__version__.partition(".")[0]) >= 3 else {"float_precision": "round_trip"}
+        parts: list[list[Array]] = [[] for _ in columns]
         try:
-            frame = pd.read_csv(
-                io.StringIO(self.text),
-                sep=self.separator,
-                decimal=self.decimal,
-                header=None,
-                names=list(range(self.width)),
-                skiprows=self.skipped + 1,
-                # All columns, as text where not wanted: with `usecols` pandas drops surplus cells silently.
-                dtype={at: np.float64 if at in wanted else str for at in range(self.width)},
-                index_col=False,
-                na_values=sorted(MISSING),
-                skipinitialspace=True,
-                engine="c",
-                **exact,
-            )
+            with self.text.opened() as handle:
+                frames = pd.read_csv(
+                    handle,
+                    sep=self.separator,
+                    decimal=self.decimal,
+                    header=None,
+                    names=list(range(self.width)),
+                    skiprows=self.skipped + 1,
+                    # All columns, as text where not wanted: with `usecols` pandas drops surplus cells silently.
+                    dtype={at: np.float64 if at in wanted else str for at in range(self.width)},
+                    index_col=False,
+                    na_values=sorted(MISSING),
+                    skipinitialspace=True,
+                    engine="c",
+                    chunksize=max(1, CELLS // self.width),
+                    **exact,
+                )
+                for frame in frames:
+                    blank = frame.isna().all(axis=1)
+                    if blank.any():  # the rows that spreadsheets append
+                        frame = frame[~blank]
+                    for part, at in zip(parts, wanted, strict=True):
+                        part.append(frame[at].to_numpy(dtype=np.float64, copy=True))
         except (ValueError, pd.errors.ParserError):
             raise self.offence(columns) from None
-        blank = frame.isna().all(axis=1)
-        if blank.any():  # the rows that spreadsheets append
-            frame = frame[~blank]
-        return {name: frame[at].to_numpy(dtype=np.float64) for name, at in zip(columns, wanted, strict=True)}
+        return {name: joined(part) for name, part in zip(columns, parts, strict=True)}
 
     def offence(self, columns: Sequence[str]) -> DataError:
         """The sentence for the first cell that is no number."""

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import codecs
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TextIO
 
 from suite.errors import DataError
 
@@ -10,28 +13,48 @@ LARGEST = 1 << 30  # bytes of a file
 PIECE = 1 << 20  # bytes read at a time, in which a line must end
 
 
-def read_text(file: Path) -> str:
-    """A text with its line ends made alike, of UTF-8, UTF-16 with or without a mark, or Latin-1. Raises DataError."""
+@dataclass(frozen=True)
+class Text:
+    """A file that is text throughout, and its encoding."""
+
+    file: Path
+    encoding: str
+
+    def opened(self) -> TextIO:
+        """The text from its beginning, its line ends made alike."""
+        return self.file.open(encoding=self.encoding)
+
+
+def text_of(file: Path) -> Text:
+    """The text in a file: UTF-8, UTF-16 with or without a mark, or Latin-1. Nothing of it is kept. Raises DataError."""
     if file.stat().st_size > LARGEST:
         raise DataError(f"{file.name}: larger than 1 GB; split it into several files, or save it as parquet")
-    raw, encoding = bytearray(), "utf-8-sig"
+    encoding, ends, zeros, decoder = "", 0, False, None
     with file.open("rb") as handle:
-        while piece := handle.read(PIECE):
-            if not raw:
+        piece = b"first"
+        while piece:
+            piece = handle.read(PIECE)
+            if not encoding:
                 encoding = _encoding(piece)
-            if encoding == "utf-8-sig" and b"\0" in piece:
+                decoder = codecs.getincrementaldecoder(encoding)()
+            zeros = zeros or b"\0" in piece
+            if encoding == "utf-8-sig" and zeros:
                 raise _no_text(file)
             if len(piece) == PIECE and b"\n" not in piece and b"\r" not in piece:
-                line = 1 + raw.count(b"\n")
-                raise DataError(f"{file.name}, line {line}: longer than 1 MB; put each sample on a line of its own")
-            raw += piece
-    try:
-        text = raw.decode(encoding)
-    except UnicodeDecodeError:
-        text = raw.decode("latin-1")
-    if "\0" in text:
-        raise _no_text(file)
-    return text.replace("\r\n", "\n").replace("\r", "\n")
+                raise DataError(f"{file.name}, line {1 + ends}: longer than 1 MB; put each sample on a line of its own")
+            ends += piece.count(b"\n")
+            try:
+                # Nothing more to read ends the last letter.
+                if decoder is not None and "\0" in decoder.decode(piece, final=not piece):
+                    raise _no_text(file)
+            except UnicodeDecodeError:
+                decoder = None
+    if decoder is None:
+        # Every byte is a letter of Latin-1.
+        if zeros:
+            raise _no_text(file)
+        encoding = "latin-1"
+    return Text(file, encoding)
 
 
 def _encoding(start: bytes) -> str:
