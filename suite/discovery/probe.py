@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+from scipy.special import chdtrc
 
 from suite.discovery.engine import Problem
 from suite.discovery.fit import Hypothesis
@@ -103,4 +103,4 @@ def _chance(problem: Problem, point: Point, active: tuple[int, ...], also: list[
     U, singular, _ = np.linalg.svd(B[:, kept] / lengths[kept], full_matrices=False)
     U = U[:, singular > 1e-3 * singular[0]]
     LM = float(((U.T @ r) ** 2).sum() / problem.noise(passed))
-    return float(stats.chi2.sf(LM, U.shape[1]))
+    return float(chdtrc(U.shape[1], LM))

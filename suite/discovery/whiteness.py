@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+from scipy.special import chdtrc
 
 from suite.record import Record
 
@@ -50,7 +50,7 @@ def ljung_box(correlations: dict[str, Array], count: int, fitted: int) -> float:
         lags = np.arange(1, len(r) + 1)
         room = np.maximum(count - lags, 1)
         statistic = count * (count + 2.0) * float((r**2 / room).sum())
-        smallest = min(smallest, float(stats.chi2.sf(statistic, max(len(r) - fitted, 1))))
+        smallest = min(smallest, float(chdtrc(max(len(r) - fitted, 1), statistic)))
     return min(1.0, smallest * len(correlations))
 
 
