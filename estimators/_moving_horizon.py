@@ -104,6 +104,8 @@ def window(model: Model, prior: Prior, steps: int, substeps: int) -> Window:
     quiet = {"print_level": 0, "sb": "yes", "tol": TOLERANCE, "max_iter": ROUNDS}
     # No sensitivity by the data is needed, nor is there one by dt where dt = 0.
     options = {"ipopt": quiet, "print_time": False, "error_on_fail": False, "expand": True, "calc_lam_p": False}
+    # A window that fails ends in the status; its evaluations are no news for the terminal.
+    options["show_eval_warnings"] = False
     solver = casadi.nlpsol("window", "ipopt", problem, options)
     return Window(solver, steps, n, noisy)
 

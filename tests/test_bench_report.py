@@ -103,6 +103,29 @@ def test_the_best_not_beaten_are_those_that_chance_cannot_tell() -> None:
     assert not ranking.not_beaten(few)[2]
 
 
+def test_what_ran_on_few_seeds_wins_only_on_those() -> None:
+    """Two seeds make no best where others have eight, and are equal to it only if they are as good on them."""
+    full = {seed: 1.0 + 0.01 * seed for seed in range(8)}
+    best, equals, able = ranking.not_beaten({"full": full, "lucky": {0: 0.9, 1: 0.9}, "slow": {0: 1.2, 1: 1.2}})
+    assert (best, equals, able) == ("full", {"full", "lucky"}, True)
+
+
+def test_a_difference_that_nobody_would_notice_is_no_victory() -> None:
+    """Half a per cent on every case, however sure."""
+    rows = _rows({"generalized-ie": 1.0})
+    rows += [{**row, "estimator": "ekf", "state_nrmse": 0.995 * row["state_nrmse"]} for row in rows]
+    said = findings.verdict(compare(rows))
+    assert said[0].startswith("Neither side wins: the best Kalman filter and the best model-error estimator are level")
+
+
+def test_the_champion_has_enough_seeds() -> None:
+    """Who would rank before it on fewer is named beside it."""
+    rows = _rows({"generalized-ie": 0.5, "ekf": 1.0, "conventional-ie": 0.4})
+    said = findings.verdict(compare(row for row in rows if row["estimator"] != "conventional-ie" or row["seed"] < 2))
+    assert any("generalized-ie ranks best" in s and "conventional-ie (2) would rank before it" in s for s in said)
+    assert "1 of them, slow ones, have fewer than 6 seeds" in said[2]
+
+
 def test_reference_rows_are_never_ranked() -> None:
     """An oracle better than all wins nothing, and stands apart in the matrix."""
     rows = _rows({"generalized-ie": 0.5, "ekf": 1.0})
@@ -184,7 +207,7 @@ def test_the_page_comes_from_the_store_alone(tmp_path: Path) -> None:
     assert seen.titles == seen.figures >= 4
     assert "1 &lt; 2 &amp; so on" in page
     assert made["verdict"][0].split(":")[0] in page
-    order = ["Who wins where", "State error over", "Performance profile", "Accuracy against", "Consistency",
+    order = ["State error over", "Who wins where", "Performance profile", "Accuracy against", "Consistency",
              "Tuning sensitivity", "Case by case", "Definitions", "Failures, verbatim", "How to reproduce"]  # fmt: skip
     places = [page.index(f">{title}") for title in order]
     assert places == sorted(places)

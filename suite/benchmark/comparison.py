@@ -81,6 +81,11 @@ class Comparison:
         counts = [len(rows) for table in self.rows.values() for at, rows in table.items() if at in judged]
         return (min(counts), max(counts)) if counts else (0, 0)
 
+    def seeds_of(self, method: Method) -> int:
+        """The number of seeds of a method under most conditions."""
+        counts = [len(rows) for at, rows in self.of(method).items() if at in set(self.conditions)]
+        return int(np.median(counts)) if counts else 0
+
     def methods(self, variant: str | None = None, **wanted: str) -> list[Method]:
         """Methods in the race, best mean rank first. Of a variant: a method without tuning stands in both lists."""
         tuned = {m.estimator for m in self.rows if m.variant == "tuned"}

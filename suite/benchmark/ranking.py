@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import friedmanchisquare, rankdata, studentized_range
 
-from suite.benchmark.statistics import holm, signed_rank
+from suite.benchmark.statistics import holm, ratios, signed_rank
 
 Array = npt.NDArray[np.float64]
 M = TypeVar("M", bound=Hashable)
@@ -71,18 +71,25 @@ def profile(scores: Array, factors: Array) -> Array:
 def not_beaten(scores: Mapping[M, Mapping[int, float]]) -> tuple[M | None, set[M], bool]:
     """Of methods with their scores by seed: the best by median, those it does not beat significantly (Wilcoxon's
     signed-rank test over common seeds, Holm over the methods, 5 %), and whether so few seeds could show it at all.
+
+    A method on too few seeds to be tested is neither the best, where others have enough, nor equal to it, unless it is
+    at least as good on the seeds that they share.
     """
     medians = {name: float(np.median(list(table.values()))) for name, table in scores.items() if table}
     alive = {name for name, middle in medians.items() if np.isfinite(middle)}
     if not alive:
         return None, set(), False
-    best = min(alive, key=lambda name: medians[name])
+    count = len(medians) - 1
+    # The smallest p-value of n pairs is 2 / 2^n.
+    able = {name for name in alive if count and 2.0 ** (1 - len(scores[name])) * count <= LEVEL}
+    best = min(able or alive, key=lambda name: medians[name])
     others = [name for name in medians if name != best]
     p = holm([signed_rank(scores[name], scores[best]) for name in others])
-    seeds = len(scores[best])
-    # The smallest p-value of n pairs is 2 / 2^n.
-    able = bool(others) and 2.0 ** (1 - seeds) * len(others) <= LEVEL
-    return best, {best} | {name for name, value in zip(others, p, strict=True) if value > LEVEL} & alive, able
+    equal = {name for name, value in zip(others, p, strict=True) if value > LEVEL}
+    if able:
+        worse = {name for name in equal - able if not np.median(ratios(scores[name], scores[best])) <= 1.0}
+        equal -= worse
+    return best, {best} | equal & alive, bool(able)
 
 
 def front(points: Mapping[M, tuple[float, float]]) -> list[M]:

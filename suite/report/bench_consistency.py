@@ -29,10 +29,13 @@ GAUGES = (
     Gauge("coverage", "inside the 95 % band", 0.95, 0.0, 1.0, False),
     Gauge("innovation_r1", "innovation correlation", 0.0, -1.0, 1.0, False),
 )
+SPANNED = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 
 def consistency(c: Comparison) -> Figure | None:
-    """A dot a condition (median over seeds), a stroke their median; None where no method states a covariance."""
+    """Where nine of ten, half, and the middle of the conditions lie (each its median over seeds); None where no method
+    states a covariance.
+    """
     methods = c.methods()
     values = {g.field: {m: _medians(c, m, g.field) for m in methods} for g in GAUGES}
     gauges = [g for g in GAUGES if any(values[g.field].values())]
@@ -41,9 +44,10 @@ def consistency(c: Comparison) -> Figure | None:
         return None
     fig = new_figure(
         "Do the methods know how wrong they are?",
-        "By method, best mean rank at the top: a dot is a condition, the stroke their median, the dashed line where "
-        "a consistent method lies. NEES or NIS above 1, coverage below 0.95: the method is surer than it may be. "
-        "Innovations that correlate with their neighbours: the filter leaves structure unexplained.",
+        "By method, best mean rank at the top: nine of ten conditions lie on the thin line, half of them on the thick "
+        "one, the stroke is their median; the dashed line is where a consistent method lies. NEES or NIS above 1, "
+        "coverage below 0.95: the method is surer than it may be. Innovations that correlate with their "
+        "neighbours: the filter leaves structure unexplained.",
         1.4 + 0.19 * len(names),
     )
     axes = fig.subplots(1, len(gauges), sharey=True, squeeze=False)[0]
@@ -60,12 +64,14 @@ def consistency(c: Comparison) -> Figure | None:
             if len(found) == 0:
                 continue
             color = ORANGE if method.variant == "default" else BLUE
-            ax.plot(found, np.full(len(found), i), "o", color=color, markersize=2.6, alpha=0.55, clip_on=False)
-            ax.plot(np.median(found), i, "|", color=color, markersize=9, markeredgewidth=2.2, clip_on=False)
+            least, lower, middle, upper, most = np.quantile(found, SPANNED)
+            ax.plot([least, most], [i, i], color=color, linewidth=0.9, clip_on=False)
+            ax.plot([lower, upper], [i, i], color=color, linewidth=3.6, alpha=0.6, solid_capstyle="butt", clip_on=False)
+            ax.plot(middle, i, "|", color=color, markersize=9, markeredgewidth=2.2, clip_on=False)
     axes[0].set_yticks(range(len(names)), [m.label for m in names], fontsize=8.5)
     axes[0].set_ylim(len(names) - 0.4, -0.6)
-    axes[0].plot([], [], "o", color=ORANGE, label="as shipped")
-    axes[0].plot([], [], "o", color=BLUE, label="tuned")
+    axes[0].plot([], [], color=ORANGE, linewidth=3.6, alpha=0.6, label="as shipped")
+    axes[0].plot([], [], color=BLUE, linewidth=3.6, alpha=0.6, label="tuned")
     legend_below(fig, axes[0])
     return fig
 

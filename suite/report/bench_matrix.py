@@ -57,7 +57,7 @@ def matrix(c: Comparison, variant: str) -> Matrix | None:
         lines.append(
             (at, [_square(c, m, at, m in bold) for m in methods], [_square(c, m, at, False) for m in references])
         )
-    return Matrix(variant, methods, references, lines, all(able))
+    return Matrix(variant, methods, references, lines, any(able))
 
 
 def _square(c: Comparison, method: Method, at: Condition, best: bool) -> Square:

@@ -22,7 +22,7 @@ from suite.files import writable_folder, write_whole
 from suite.report import bench_cases, bench_consistency, bench_origin, bench_ranking, bench_sensitivity
 from suite.report.bench_figures import STYLE
 from suite.report.bench_matrix import Matrix, as_rows, matrix, scale
-from suite.report.vector import share_letters, svg
+from suite.report.vector import share, svg
 
 Row = Mapping[str, Any]
 POINTS = 50_000  # of all curves of the pictures of cases together, at about 12 bytes each
@@ -139,7 +139,7 @@ def _page(
         lstrip_blocks=True,
     )
     environment.filters["number"] = number
-    shared, letters = share_letters(drawn)
+    shared, letters = share(drawn)
     failed = bench_origin.failures(rows)
     measured = sorted({row["case"] for row in rows} - set(c.cases))
     commands = bench_origin.commands(c, store)

@@ -18,7 +18,7 @@ from suite.fleet import ranking
 from suite.fleet.stored import Brief
 from suite.model import Model
 from suite.report import fleet_figures
-from suite.report.vector import share_letters, svg
+from suite.report.vector import share, svg
 
 Row = Mapping[str, Any]
 SHOWN = 200  # machines in the table of the page
@@ -41,7 +41,7 @@ def write(
     )
     figures = {"bars": fleet_figures.bars(briefs), "ranking": fleet_figures.ranking(briefs)}
     drawn = {name: figure for name, figure in figures.items() if figure is not None}
-    shared, letters = share_letters({name: svg(figure, name) for name, figure in drawn.items()})
+    shared, letters = share({name: svg(figure, name) for name, figure in drawn.items()})
     page = environment.get_template("fleet.html.j2").render(
         model=model.name,
         outputs=list(model.outputs),

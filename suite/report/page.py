@@ -21,7 +21,7 @@ from suite.model import Model
 from suite.report import correlation, failure, figures
 from suite.report.canvas import MOST
 from suite.report.figures import SEPARABLE, change, plain
-from suite.report.vector import share_letters, svg
+from suite.report.vector import share, svg
 
 # Points of all curves together, at about 17 bytes each.
 POINTS = 50_000
@@ -117,7 +117,7 @@ def _page(ledger: Ledger, command: str, sentence: str, effects: Mapping[str, Eff
     drawn = {"waterfall": svg(figures.waterfall(ledger), "waterfall")}
     for k, step in enumerate(ledger.steps):
         drawn |= {f"step{k}-{name}": svg(fig, f"step{k}-{name}") for name, fig in _drawn(ledger, step, most).items()}
-    shared, letters = share_letters(drawn)
+    shared, letters = share(drawn)
     steps = [_step(ledger, k, effects) for k in range(len(ledger.steps))]
     columns = list(dict.fromkeys(name for row in ledger.history for name in row))
     return environment.get_template("report.html.j2").render(
