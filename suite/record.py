@@ -32,8 +32,8 @@ class Record:
     """Measurements on a time axis of their own: t (N,), u (N, inputs), y (N, outputs), NaN in y where missing.
 
     `starts` are the first samples of the runs, `names` their names (none, or one a run); within a run time increases.
-    There is no field for the truth, so no estimator can see it. Raises DataError where shapes disagree, time does not
-    increase, or a run has one sample.
+    `whole` is there in an excerpt of a very long record. There is no field for the truth, so no estimator can see it.
+    Raises DataError where shapes disagree, time does not increase, or a run has one sample.
     """
 
     t: Array
@@ -43,6 +43,7 @@ class Record:
     names: tuple[str, ...] = ()
     prior: Prior | None = None
     source: str = field(default="record", compare=False)
+    whole: Whole | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         for name in ("t", "u", "y"):
@@ -99,8 +100,21 @@ class Record:
         return replace(self, prior=prior)
 
 
+@dataclass(frozen=True)
+class Whole:
+    """What an excerpt was cut from: the record, the samples there at which the pieces begin, and the pieces' usual
+    length; the pieces are the excerpt's runs until a plant that forgets its start has them cut further.
+    """
+
+    record: Record
+    first: tuple[int, ...]
+    length: int
+
+
 def join(records: Sequence[Record]) -> Record:
     """Several runs of the same plant as one record."""
+    if len(records) == 1:
+        return records[0]
     lengths = np.cumsum([0] + [len(record) for record in records])
     starts = tuple(int(at + s) for record, at in zip(records, lengths, strict=False) for s in record.starts)
     return replace(

@@ -14,9 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from suite import plugins
-from suite.discovery import checkup, misfit
+from suite.discovery import checkup, misfit, stated
 from suite.discovery.adding import added
 from suite.discovery.evidence import evidence
+from suite.discovery.excerpt import excerpt
 from suite.discovery.fit import fit, prepare
 from suite.discovery.library import candidates
 from suite.discovery.loop import discover as loop
@@ -94,6 +95,8 @@ def check(args: argparse.Namespace) -> int:
         print(f"{name}: range {facts['range']:.4g}, noise {facts['noise']:.3g} ({origin}), {facts['missing']} missing")
     for name, facts in found.facts["inputs"].items():
         print(f"{name}: range {facts['range']:.4g}, {facts['levels']} values")
+    if "excerpt" in found.facts:
+        print(found.facts["excerpt"])
     for sentence in found.findings or ("Nothing stands in the way of an analysis.",):
         print(f"- {sentence}")
     return 1 if args.strict and found.findings else 0
@@ -101,16 +104,19 @@ def check(args: argparse.Namespace) -> int:
 
 def compare(args: argparse.Namespace) -> int:
     """Print how the model's free run compares with the data."""
-    model, record = _read(args)
+    model, whole = _read(args)
+    record = excerpt(model if args.refit else misfit.frozen(model), whole)
     if args.refit:
         model = fit(model, record).model
     found = misfit.compare(model, record)
     failing = evidence(model, record, found)
+    said = stated.sentence(record, found)
     if args.json:
         noise = dict(zip(model.outputs, map(float, found.sigma), strict=True))
         numbers = {"fit": dict(found.fit), "error": dict(found.error), "noise": noise}
-        return _json({**numbers, "worst": failing["worst"], "sentence": found.sentence, "where": failing})
-    print(found.sentence, failing["sentence"], sep="\n")
+        part = {"excerpt": said} if said else {}
+        return _json({**numbers, "worst": failing["worst"], "sentence": found.sentence, "where": failing, **part})
+    print(*filter(None, [found.sentence, failing["sentence"], said]), sep="\n")
     return 0
 
 

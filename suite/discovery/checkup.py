@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from suite import units
-from suite.discovery import determined
+from suite.discovery import determined, words
 from suite.discovery.engine import Problem
+from suite.discovery.excerpt import excerpt
 from suite.discovery.fit import Hypothesis, homotopy, levenberg_marquardt, prepare
 from suite.discovery.identify import ALARM
 from suite.discovery.mixups import mixups
@@ -40,15 +41,18 @@ def check(model: Model, record: Record) -> Checkup:
     units.check(model)
     facts["outputs"] = _outputs(model, record, findings)
     facts["inputs"] = _inputs(model, record, findings)
-    problem = prepare(model, record)
+    part = excerpt(model, record)
+    problem = prepare(model, part)
     level = homotopy(problem, problem.start)
     at = level.exact if np.isfinite(level.exact.L) else level.best
     facts["undetermined"] = determined.facts(problem, at, level.layout)
     findings += determined.findings(problem, at, level.layout)
-    findings += [mixup.sentence for mixup in mixups(model, record, level)[:1]]
+    findings += [mixup.sentence for mixup in mixups(model, part, level)[:1]]
     if model.inputs:
         _holds(problem, level, findings)
     facts["input_delay"] = _delays(problem, level.exact.point, findings) if model.inputs else {}
+    if part.whole is not None:
+        facts["excerpt"] = words.excerpt(len(record), len(part), len(part.starts))
     return Checkup(facts, tuple(findings))
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from suite.discovery.engine import Problem
+from suite.discovery.engine import Pass, Problem
 from suite.discovery.fit import Level, covariance
 from suite.discovery.frame import Layout
 
@@ -37,15 +37,27 @@ def directions(problem: Problem, level: Level, layout: Layout) -> Directions:
     J = level.passed.J
     if not labels or not level.passed.finite or not np.isfinite(J).all():
         return Directions(tuple(labels), (), ())
-    norms = np.sqrt((J**2).sum(axis=0))
+    norms, singular, Vt = _decomposed(problem, level.passed, len(layout.columns))
     dead = [labels[i] for i in np.flatnonzero(norms <= 1e-12 * max(float(norms.max()), 1e-300))]
-    _, singular, Vt = np.linalg.svd(J / np.where(norms > 0, norms, 1.0), full_matrices=False)
     mixed = []
     for value, direction in zip(singular, Vt, strict=True):
         members = tuple(labels[i] for i in np.flatnonzero(np.abs(direction) > 0.2))
         if value < NULL * singular[0] and not set(members) <= set(dead):
             mixed.append(members)
     return Directions(tuple(labels), tuple(dead), tuple(mixed))
+
+
+def _decomposed(problem: Problem, passed: Pass, parameters: int) -> tuple[Array, Array, Array]:
+    """The columns' norms; singular values, largest first, and right singular vectors of the Jacobian scaled by them."""
+    J = passed.J
+    if passed.rows is None:
+        norms = np.sqrt((J**2).sum(axis=0))
+        return norms, *np.linalg.svd(J / np.where(norms > 0, norms, 1.0), full_matrices=False)[1:]
+    A = problem.normal(passed, parameters)[0]
+    norms = np.sqrt(np.diag(A))
+    scale = np.where(norms > 0, norms, 1.0)
+    values, vectors = np.linalg.eigh(A / np.outer(scale, scale))
+    return norms, np.sqrt(np.maximum(values[::-1], 0.0)), vectors.T[::-1]
 
 
 def facts(problem: Problem, level: Level, layout: Layout) -> dict[str, Any]:

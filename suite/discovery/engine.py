@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from suite.discovery.frame import Frame, Layout, Point
+from suite.discovery.frame import Frame, Index, Layout, Point
 from suite.discovery.noise import QUIETEST, spans
 from suite.discovery.terms import Term
 from suite.kernels.integrate import workspace
@@ -25,7 +25,11 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Pass:
-    """One pass: e (M,) errors in noise units, J (M, theta), logs = sum ln s, Y (N, outputs), X (N, active states)."""
+    """One pass: e (M,) errors in noise units, J (M, theta), logs = sum ln s, Y (N, outputs), X (N, active states).
+
+    Of an excerpt J is narrow, (M, first states of one run + parameters): each row has those of its own run, and `rows`
+    (runs + 1,) says where the runs begin.
+    """
 
     e: Array
     J: Array
@@ -33,14 +37,22 @@ class Pass:
     Y: Array
     X: Array
     finite: bool
+    rows: Index | None = None
+
+    def width(self, parameters: int) -> int:
+        """How many numbers theta has, of which so many are parameters."""
+        if self.rows is None:
+            return int(self.J.shape[1])
+        return (len(self.rows) - 1) * (int(self.J.shape[1]) - parameters) + parameters
 
 
 @dataclass(frozen=True, eq=False)
 class Problem(Frame):
     """A frame with its passes."""
 
-    def run(self, point: Point, q: float, layout: Layout | None = None) -> Pass:
-        """One pass at process-noise level q, with the candidates of the layout on.
+    def run(self, point: Point, q: float, layout: Layout | None = None, u: Array | None = None) -> Pass:
+        """One pass at process-noise level q, with the candidates of the layout on; `u` are the inputs where they are
+        known already.
 
         J's columns: the free initial states of run 0, 1, ..., then the layout's parameters.
         """
@@ -57,7 +69,7 @@ class Problem(Frame):
         )  # fmt: skip
         Q = np.zeros(n)
         Q[: len(self.weights)] = q * 10.0 * self.weights**2 * self.step
-        u = self.inputs(point.p)
+        u = self.inputs(point.p) if u is None else u
         failed = prediction_errors(
             program.step_when(at.on), program.rate, program.output, record.t, u, self.linear, record.y, record.bounds,
             np.ascontiguousarray(point.x0[:, at.states]), point.p, at.on, at.columns, Q, self.R, self.angles,
@@ -70,7 +82,7 @@ class Problem(Frame):
         if self.colour is not None and q == 0.0 and finite:
             e, J = self.whitened(e), self.whitened(J)
             logs += float((seen.sum(axis=0) * np.log(1.0 - self.colour**2)).sum())
-        return Pass(e[seen], self._scatter(J, at), logs, self._turned(Y), X, finite)
+        return Pass(e[seen], self._scatter(J, at), logs, self._turned(Y), X, finite, self._rows)
 
     def whitened(self, e: Array) -> Array:
         """Errors (N, outputs) or their Jacobian (N, outputs, theta) less what the noise remembers, in its own units."""
@@ -100,7 +112,7 @@ class Problem(Frame):
         """Each run's own initial-state columns at their place in theta; rows of missing samples left out."""
         n, free = len(at.states), at.free
         runs = len(self.record.starts)
-        if runs == 1:
+        if runs == 1 or self._rows is not None:
             keep = np.concatenate([free, np.arange(n, J.shape[2])])
             return J[self.seen][:, keep]
         wide = np.zeros((*J.shape[:2], runs * len(free) + J.shape[2] - n))
@@ -111,10 +123,19 @@ class Problem(Frame):
         wide[:, :, runs * len(free) :] = J[:, :, n:]
         return wide[self.seen]
 
+    @cached_property
+    def _rows(self) -> Index | None:
+        """Of an excerpt, which has many runs, the measurement at which each begins, and their number: (runs + 1,)."""
+        if self.record.whole is None:
+            return None
+        return np.concatenate([[0], np.cumsum(self.seen.sum(axis=1))])[self.record.bounds]
+
     def normal(self, passed: Pass, parameters: int) -> tuple[Array, Array]:
         """J'J and J'e of a pass whose last `parameters` columns are the layout's; a run's first states meet only the
         rows of that run.
         """
+        if passed.rows is not None:
+            return _by_runs(passed, passed.rows, parameters)
         J, e = passed.J, passed.e
         edge, runs = J.shape[1] - parameters, len(self.record.starts)
         if runs == 1 or edge == 0:
@@ -183,3 +204,19 @@ class Problem(Frame):
         other = replace(self, record=record, start=start, **changes)
         other.__dict__["program"] = self.program
         return other
+
+
+def _by_runs(passed: Pass, rows: Index, parameters: int) -> tuple[Array, Array]:
+    """J'J and J'e of a pass whose J is narrow."""
+    free, runs = passed.J.shape[1] - parameters, len(rows) - 1
+    edge = runs * free
+    A, g = np.zeros((edge + parameters, edge + parameters)), np.zeros(edge + parameters)
+    for r, (first, last) in enumerate(pairwise(rows)):
+        J = passed.J[first:last]
+        product, own = J.T @ J, slice(r * free, (r + 1) * free)
+        A[own, own], A[own, edge:], A[edge:, own] = product[:free, :free], product[:free, free:], product[free:, :free]
+        A[edge:, edge:] += product[free:, free:]
+        pull = J.T @ passed.e[first:last]
+        g[own] = pull[:free]
+        g[edge:] += pull[free:]
+    return A, g

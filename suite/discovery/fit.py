@@ -257,7 +257,8 @@ def summarise(problem: Problem, hypothesis: Hypothesis) -> Fit:
     """What a fitted hypothesis says of the model's own parameters."""
     exact = hypothesis.exact
     columns = hypothesis.columns
-    variances = np.diag(covariance(problem, exact, columns))[len(exact.passed.J[0]) - len(columns) :]
+    variances = np.diag(covariance(problem, exact, columns))
+    variances = variances[len(variances) - len(columns) :]
     sds = dict(zip(columns.tolist(), np.sqrt(np.maximum(variances, 0.0)), strict=True))
     names = list(problem.model.parameters)
     parameters = {name: (float(exact.point.p[j]), float(sds.get(j, 0.0))) for j, name in enumerate(names)}

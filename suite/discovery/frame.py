@@ -138,6 +138,10 @@ class Frame:
             known[key] = channels(self.record, delays, dict.fromkeys(self._held, True))
         return np.asarray(known[key])
 
+    def delay(self, p: Array) -> float:
+        """The longest time, at the delays in p, by which an input acts later than it was measured."""
+        return max((float(p[place]) for place in self._late.values()), default=0.0)
+
     @cached_property
     def seen(self) -> npt.NDArray[np.bool_]:
         """Which measurements are there, (N, outputs)."""

@@ -62,7 +62,7 @@ class Search:
 
 def _few(samples: int, hypothesis: Hypothesis) -> float:
     """What a short record adds to the price of parameters, 2 k (k + 1) / (n - k - 1): Hurvich and Tsai (1989)."""
-    k = hypothesis.exact.passed.J.shape[1]
+    k = hypothesis.exact.passed.width(len(hypothesis.columns))
     return 2.0 * k * (k + 1) / (samples - k - 1) if samples > k + 1 else np.inf
 
 

@@ -54,7 +54,7 @@ def _block(problem: Problem, base: Hypothesis) -> Problem:
     starts = [first, *(s for s in inner if first < s < last)]
     part = replace(
         record, t=record.t[first:last], u=record.u[first:last], y=record.y[first:last],
-        starts=tuple(s - first for s in starts), names=(),
+        starts=tuple(s - first for s in starts), names=(), whole=None,
     )  # fmt: skip
     x0 = np.zeros((len(starts), problem.start.x0.shape[1]))
     x0[:, :n] = base.best.passed.X[starts, :n]

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from suite.discovery import misfit
+from suite.discovery import misfit, stated
 from suite.discovery.discrepancy import discrepancy
+from suite.discovery.excerpt import excerpt
 from suite.discovery.fit import summarise
 from suite.discovery.identify import Search
 from suite.discovery.outcome import amended, residual
@@ -34,6 +35,8 @@ def discover(
     The steps' models stand at the values fitted to the whole record; priors stay the file's throughout, so that
     nothing is learned twice from the same data. `progress` is told a sentence now and then.
     """
+    # The same pieces of a very long record in every round, so that the errors compare.
+    record = excerpt(model, record)
     steps: list[Step] = []
     history: list[dict[str, object]] = []
     current = model
@@ -59,7 +62,8 @@ def step_of(found: Search, verdict: Verdict) -> Step:
     problem, base = found.problem, found.base
     fitted = summarise(problem, base)
     names = list(problem.model.outputs)
-    comparison = misfit.compare(fitted.model, problem.record, base.exact.passed.Y, problem.R**0.5)
+    over_all = stated.over_base(found, verdict.error)
+    comparison = misfit.compare(fitted.model, problem.record, base.exact.passed.Y, problem.R**0.5, over_all)
     error = discrepancy(problem, base.exact.point)
     said = where(error, problem.record, problem.model)
     held = verdict.error.get("held_out", {}).get("before", {})

@@ -13,6 +13,8 @@ from scipy.special import gammaincinv
 from suite.discovery.fit import homotopy, prepare
 from suite.discovery.noise import noise_variance
 from suite.discovery.result import Comparison
+from suite.discovery.stated import holds
+from suite.discovery.whole import PIECE, Survey, survey
 from suite.model import Model
 from suite.record import Record
 
@@ -59,22 +61,50 @@ def residual(model: Model, record: Record, Y: Array, sigma: Array) -> Array:
     return e / np.where(sigma > 0, sigma, 1.0)
 
 
-def compare(model: Model, record: Record, Y: Array | None = None, sigma: Array | None = None) -> Comparison:
-    """The model beside the record: error, fit % = 100 (1 - |y - Y| / |y - mean y|), the worst intervals."""
+def compare(
+    model: Model, record: Record, Y: Array | None = None, sigma: Array | None = None, over_all: Survey | None = None
+) -> Comparison:  # fmt: skip
+    """The model beside the record: error, fit % = 100 (1 - |y - Y| / |y - mean y|), the worst intervals.
+
+    `over_all`: a simulation of the whole record of which `record` is an excerpt; the numbers are then of that. It is
+    made here where Y is not given. `worst` is of the record itself.
+    """
+    over_all = _over_all(model, record) if Y is None else over_all
     Y = simulate(model, record) if Y is None else Y
     sigma = np.sqrt(noise_variance(model, record)) if sigma is None else sigma
     names = list(model.outputs)
-    error = rmse(record, Y, names)
-    spread = {name: float(np.nanstd(record.y[:, j])) for j, name in enumerate(names)}
+    error, judged = rmse(record, Y, names), record
+    if record.whole is not None and over_all is not None and holds(over_all, error, names):
+        error, judged = dict(zip(names, over_all.error.tolist(), strict=True)), record.whole.record
+    whole = judged is not record
+    spread = {name: float(np.nanstd(judged.y[:, j])) for j, name in enumerate(names)}
     fit = {name: 100.0 * (1.0 - error[name] / spread[name]) if spread[name] > 0 else np.nan for name in names}
     worst = _worst(record, residual(model, record, Y, sigma))
+    worst_of_all = _worst_pieces(judged, over_all) if whole and over_all is not None else worst
     words = [f"{fit[name]:.3g} % of {name} (error {error[name]:.3g}, noise {sigma[j]:.2g})"
              for j, name in enumerate(names)]  # fmt: skip
-    if worst:
-        run, first, last = worst[0]
-        which = f" of run {run + 1}" if len(record.starts) > 1 else ""
+    if worst_of_all:
+        run, first, last = worst_of_all[0]
+        which = f" of run {run + 1}" if len(judged.starts) > 1 else ""
         words.append(f"the worst part is t = {first:.3g} to {last:.3g}{which}")
-    return Comparison(Y, sigma, error, fit, worst, f"The model explains {'; '.join(words)}.")
+    return Comparison(Y, sigma, error, fit, worst, f"The model explains {'; '.join(words)}.", whole)
+
+
+def _over_all(model: Model, record: Record) -> Survey | None:
+    """The model's free run over the whole record that this is an excerpt of; None where it is none."""
+    if record.whole is None:
+        return None
+    whole = record.whole.record
+    problem = prepare(frozen(model), whole.part(0, min(int(whole.bounds[1]), PIECE)))
+    return survey(problem, model.values, (), whole, length=record.whole.length)
+
+
+def _worst_pieces(record: Record, found: Survey) -> tuple[tuple[int, float, float], ...]:
+    """The three worst pieces of a whole record, by the rule of `_worst`."""
+    home = np.searchsorted(record.bounds, found.first, side="right") - 1
+    loud = found.square * found.count > _loud(np.maximum(found.count, 1))
+    order = [k for k in np.argsort(-np.nan_to_num(found.square), kind="stable").tolist() if loud[k]]
+    return tuple((int(home[k]), float(record.t[found.first[k]]), float(record.t[found.last[k] - 1])) for k in order[:3])
 
 
 def _worst(record: Record, e: Array) -> tuple[tuple[int, float, float], ...]:

@@ -14,6 +14,7 @@ Array = npt.NDArray[np.float64]
 
 OUTLIER = 6.0  # robust standard deviations by which a sample stands out from its neighbours
 MOST = 0.05  # of an output's samples: where more than that stand out, they are no outliers
+PART = 131_072  # samples whose neighbours are looked at together
 QUIETEST = 1e-7  # of an output's range: below it the integrator, not the sensor, makes the error
 
 
@@ -62,6 +63,13 @@ def _innovation(t: Array, y: Array) -> Array:
     t, y = t[there], y[there]
     if len(y) < 8:
         return np.zeros(0)
+    # A window of five in each row; of very many rows in parts, for they are 25 numbers each.
+    parts = range(0, len(y) - 4, PART)
+    return np.concatenate([_departures(t[at : at + PART + 4], y[at : at + PART + 4]) for at in parts])
+
+
+def _departures(t: Array, y: Array) -> Array:
+    """The squared departure of each of five neighbours' last from the cubic through the others, (N - 4,)."""
     # Weights of the fourth divided difference over five neighbours; their squares scale it to one sample's variance.
     windows = np.lib.stride_tricks.sliding_window_view(t, 5)
     values = np.lib.stride_tricks.sliding_window_view(y, 5)
@@ -76,10 +84,14 @@ def spikes(y: Array, sigma: float) -> npt.NDArray[np.bool_]:
     """Single samples that stand out from the median of their five neighbours."""
     if len(y) < 7:
         return np.zeros(len(y), dtype=bool)
-    padded = np.pad(y, 2, mode="reflect")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 5)
-    reach = np.sort(np.abs(windows - np.median(windows, axis=1)[:, None]), axis=1)[:, 3]
-    return np.asarray(np.abs(y - np.median(windows, axis=1)) > OUTLIER * np.maximum(sigma, reach))
+    windows = np.lib.stride_tricks.sliding_window_view(np.pad(y, 2, mode="reflect"), 5)
+    found = np.zeros(len(y), dtype=bool)
+    for at in range(0, len(y), PART):
+        part = windows[at : at + PART]
+        middle = np.median(part, axis=1)
+        reach = np.sort(np.abs(part - middle[:, None]), axis=1)[:, 3]
+        found[at : at + PART] = np.abs(y[at : at + PART] - middle) > OUTLIER * np.maximum(sigma, reach)
+    return found
 
 
 def without_outliers(model: Model, record: Record) -> tuple[Record, int]:
@@ -87,9 +99,15 @@ def without_outliers(model: Model, record: Record) -> tuple[Record, int]:
 
     One that stands out beside another is not taken for an outlier: the plant itself may have moved.
     """
+    y = without_spikes(model, record, noise_variance(model, record))
+    dropped = int(np.isnan(y).sum() - np.isnan(record.y).sum())
+    return (replace(record, y=y), dropped) if dropped else (record, 0)
+
+
+def without_spikes(model: Model, record: Record, R: Array) -> Array:
+    """The outputs (N, outputs) without the samples that stand out alone, at noise variances R (outputs,)."""
     y = record.y.copy()
-    sigma = np.sqrt(noise_variance(model, record))
-    dropped = 0
+    sigma = np.sqrt(R)
     for first, last in zip(record.bounds[:-1], record.bounds[1:], strict=True):
         for j, output in enumerate(model.outputs.values()):
             values = unrolled(record.part(first, last), j, output.angle)
@@ -98,5 +116,4 @@ def without_outliers(model: Model, record: Record) -> tuple[Record, int]:
             alone = found & ~np.roll(found, 1) & ~np.roll(found, -1)
             if 0 < alone.sum() <= MOST * len(there):
                 y[first + there[alone], j] = np.nan
-                dropped += int(alone.sum())
-    return (replace(record, y=y), dropped) if dropped else (record, 0)
+    return y

@@ -17,7 +17,7 @@ from scipy.special import chdtrc
 from suite.discovery.engine import Problem
 from suite.discovery.fit import Hypothesis
 from suite.discovery.frame import Point
-from suite.discovery.scoring import projected
+from suite.discovery.projection import projected
 from suite.discovery.terms import Term
 from suite.effect import Effect, Inner
 

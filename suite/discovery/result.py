@@ -20,7 +20,7 @@ Kind = Literal["missing_effect", "adequate", "ambiguous", "unexplained"]
 class Comparison:
     """A model beside a record: the free-run simulation Y (N, outputs), the noise sd of each output, and in numbers
     by output the error (RMSE), the fit in percent of the output's variation; `worst` intervals (run, first, last time)
-    and a sentence that says where it fails.
+    and a sentence that says where it fails. `over_all`: of an excerpt, whether the numbers are of the whole record.
     """
 
     Y: Array
@@ -29,6 +29,7 @@ class Comparison:
     fit: Mapping[str, float]
     worst: tuple[tuple[int, float, float], ...] = ()
     sentence: str = ""
+    over_all: bool = False
 
 
 @dataclass(frozen=True)

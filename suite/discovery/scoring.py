@@ -14,10 +14,11 @@ from itertools import combinations
 import numpy as np
 import numpy.typing as npt
 
-from suite.discovery.engine import Pass, Problem
+from suite.discovery.engine import Problem
 from suite.discovery.fit import Hypothesis, Level
-from suite.discovery.frame import Index, Point
+from suite.discovery.frame import Point
 from suite.discovery.library import incompatible
+from suite.discovery.projection import projected
 from suite.discovery.starts import brought
 from suite.discovery.terms import Term
 
@@ -237,30 +238,6 @@ def _half(problem: Problem, found: Columns, k: int, c: Array, at: int, q: float)
     values = found.p[problem.places(k)]
     values[:count] = c[at : at + count]
     return Score(k, 0.0, values, q, 0.0)
-
-
-def projected(problem: Problem, passed: Pass, own: Index, width: int, prior: bool = True) -> tuple[Array, Array, Array]:
-    """The error and the candidates' columns with initial states and parameters projected out (prior rows included).
-
-    Returns r (M + priors,), B (M + priors, candidates), and the candidates' columns before, (M, candidates).
-    """
-    A, C = passed.J[:, :width], passed.J[:, width:]
-    noise = problem.noise(passed)
-    sd = problem.prior[1][own]
-    rows = np.zeros((len(own), width))
-    informed = np.isfinite(sd) if prior else np.zeros(len(sd), dtype=bool)
-    rows[np.arange(len(own)), width - len(own) + np.arange(len(own))] = np.where(
-        informed, np.sqrt(noise) / np.where(informed, sd, 1.0), 0.0
-    )
-    A = np.vstack([A, rows])
-    norms = np.sqrt((A**2).sum(axis=0))
-    A = A[:, norms > 0] / norms[norms > 0]
-    values, vectors = np.linalg.eigh(A.T @ A)
-    kept = values > 1e-14 * values.max(initial=0.0)
-    U = A @ (vectors[:, kept] / np.sqrt(values[kept]))
-    whole = np.vstack([np.column_stack([passed.e, C]), np.zeros((len(own), 1 + C.shape[1]))])
-    whole = whole - U @ (U.T @ whole)
-    return whole[:, 0], whole[:, 1:], C
 
 
 def absorbed(problem: Problem, base: Hypothesis) -> tuple[int, ...]:

@@ -51,8 +51,10 @@ def first_states(model: Model, record: Record) -> tuple[Array, npt.NDArray[np.bo
         given = model.initial.get(name)
         if given is not None:
             x0[:, i] = given.value
-            free[i] = given.estimate
-            continue
+            # The pieces of an excerpt begin wherever the plant then was.
+            free[i] = given.estimate or record.whole is not None
+            if record.whole is None:
+                continue
         position = next((p for p in model.definitions if model.states[p].strip() == name), None)
         for r, run in enumerate(record.runs):
             own = measured.get(name, measured.get(position or ""))

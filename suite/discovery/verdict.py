@@ -6,8 +6,9 @@ import time
 from collections.abc import Mapping
 from dataclasses import replace
 
-from suite.discovery import determined, misfit, separability, words
+from suite.discovery import determined, misfit, separability, stated, words
 from suite.discovery.colour import coloured
+from suite.discovery.excerpt import excerpt
 from suite.discovery.fit import Hypothesis, prepare
 from suite.discovery.identify import ALARM, Search, search
 from suite.discovery.library import candidates
@@ -31,6 +32,7 @@ def diagnose(model: Model, record: Record, effects: Mapping[str, Effect], absolu
 def investigate(model: Model, record: Record, effects: Mapping[str, Effect], absolute: bool = False) -> Search:
     """Everything that was fitted to this record."""
     began = time.perf_counter()
+    record = excerpt(model, record)
     problem = prepare(model, record, candidates(model, effects, absolute, record))
     found = search_long(problem) if len(record) > LONG else coloured(search(problem))
     return replace(found, seconds=time.perf_counter() - began)
@@ -58,7 +60,8 @@ def judge(found: Search) -> tuple[Verdict, Hypothesis]:
             "lambda": float(base.gain), "threshold": ALARM,
             "ljung_box_p": white(problem, base.exact, len(problem.columns(()))),
         },
-        separability.smallest_detectable(found, named), errors(found, named), parameters(problem, named), 0.0,
+        separability.smallest_detectable(found, named), stated.over_all(found, named, errors(found, named)),
+        parameters(problem, named), 0.0,
     )  # fmt: skip
     advice: tuple[str, ...] = ()
     if said == "ambiguous":
@@ -73,6 +76,7 @@ def judge(found: Search) -> tuple[Verdict, Hypothesis]:
         advice = (*advice, words.colour(names, problem.colour.tolist()))
     if problem.dropped:
         advice = (*advice, words.outliers(problem.dropped))
+    advice = (*advice, *stated.advice(found, named, verdict.error))
     verdict = replace(verdict, advice=advice, sentence=words.sentence(verdict, problem, weighing.settled))
     return replace(verdict, seconds=found.seconds + time.perf_counter() - began), named
 

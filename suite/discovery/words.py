@@ -23,7 +23,7 @@ def sentence(verdict: Verdict, problem: Problem, settled: bool) -> str:
             )
             return f"The model is adequate{_moved(verdict)}: {white} (p = {p:.2g}) and no effect is missing."
         case "unexplained":
-            before, noise = _numbers(verdict.error["before"]), _numbers(verdict.error["noise"])
+            before, noise = numbers(verdict.error["before"]), numbers(verdict.error["noise"])
             near = " with ".join(named.effect for named in verdict.plausible[0].effects) if verdict.plausible else ""
             closest = f" The closest is {near}." if near else ""
             return (
@@ -113,6 +113,16 @@ def outliers(count: int) -> str:
     return f"{count} samples stand out from their neighbours like outliers and were left out."
 
 
+def excerpt(samples: int, used: int, pieces: int, whole: bool | None = None) -> str:
+    """That a very long record is not fitted whole, and what the errors are of: all of it (`whole`) or the pieces."""
+    errors = "a simulation of all of them" if whole else "these pieces, each from a first state of its own"
+    said = "" if whole is None else f"; the errors stated are of {errors}"
+    return (
+        f"The record has {samples} samples: what is fitted is fitted to {used} of them, in {pieces} pieces that are "
+        f"evenly spread or where the model fails most{said}."
+    )
+
+
 def separate(best: Sequence[str], rival: Sequence[str], apart: float, times: str) -> str:
     """What it would take to tell two hypotheses apart."""
     return (
@@ -144,7 +154,8 @@ def _falls(verdict: Verdict) -> str:
     return "the error of " + ", of ".join(parts)
 
 
-def _numbers(values: dict[str, float]) -> str:
+def numbers(values: dict[str, float]) -> str:
+    """Values by name, in a row."""
     return ", ".join(f"{value:.3g} ({name})" for name, value in values.items())
 
 

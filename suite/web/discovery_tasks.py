@@ -60,7 +60,9 @@ def analyse(source: str, files: Sequence[tuple[str, str]], absolute: bool, key: 
         "step": shown,
         "verdict": verdict_payload.verdict(found, verdict, step, record, effects),
     }
-    return text(said), pickle.dumps(Analysis(bare(model), record, replace(step, model=bare(step.model))))
+    # The report shows the excerpt of a very long record; the rest need not be kept.
+    kept = Analysis(bare(model), replace(record, whole=None), replace(step, model=bare(step.model)))
+    return text(said), pickle.dumps(kept)
 
 
 def bare(model: Model) -> Model:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from suite.discovery import misfit
 from suite.discovery.discrepancy import discrepancy
+from suite.discovery.excerpt import excerpt
 from suite.discovery.fit import prepare
 from suite.discovery.misfit import frozen
 from suite.discovery.where import where
@@ -129,7 +130,7 @@ def known(source: str) -> Model:
 
 @lru_cache(maxsize=4)
 def both(source: str, files: tuple[tuple[str, str], ...]) -> tuple[Model, Record]:
-    """The model and its record."""
+    """The model and its record, of a very long one an excerpt."""
     found = known(source)
     if not files:
         raise DataError("no data; open a file of measurements")
@@ -140,7 +141,7 @@ def both(source: str, files: tuple[tuple[str, str], ...]) -> tuple[Model, Record
     except DataError as error:
         raise renamed(error, files) from None
     names = tuple(name for _, name in files)
-    return found, replace(record, names=names, source=", ".join(dict.fromkeys(names)))
+    return found, excerpt(found, replace(record, names=names, source=", ".join(dict.fromkeys(names))))
 
 
 @lru_cache(maxsize=4)
