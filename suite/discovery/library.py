@@ -21,6 +21,7 @@ from suite.model import Model
 from suite.names import NAME
 from suite.record import Record
 
+MANY_STATES = 12  # above which a coupling is tried between states that an equation connects already
 FEW_STATES = 4  # up to which any three states are tried together
 SPEED = re.compile(r"(v|vx|vy|vz|w|omega|speed)\d*\Z")  # names of speeds whose position is no state
 # Roles of everything that is no state; they say where the effect acts.
@@ -137,6 +138,9 @@ def _in_rate(model: Model, effect: Effect, equation: str, level: str | None, nam
     others = [s for s in model.states if s not in own] if "other" in wanted else [""]
     if "other" in wanted and effect.id == "product_coupling":
         others = [s for s in model.states if s != equation]
+    if "other" in wanted and len(model.states) > MANY_STATES:
+        connected = roles.connected(model, equation)
+        others = [s for s in others if s in connected]
     if "source" in wanted:
         others = [s for s in roles.sources(model, equation) if s in model.suspects]
     small = len(model.states) <= FEW_STATES

@@ -72,6 +72,14 @@ def sources(model: Model, equation: str) -> list[str]:
     return [name for name in order if name in reached and name != equation]
 
 
+def connected(model: Model, equation: str) -> set[str]:
+    """The states in a rate, and the position or the rate of each: what acts there already."""
+    rate = model.rates[list(model.states).index(equation)]
+    inside = {name for name in model.states if expressions.symbol(name) in rate.free_symbols} | {equation}
+    pairs = [{p, model.states[p].strip()} for p in model.definitions]
+    return inside.union(*(pair for pair in pairs if pair & inside))
+
+
 def is_angle(model: Model, state: str) -> bool:
     """Whether a position is an angle: by its unit, by its output, or by its name."""
     unit = model.units.get(state)
