@@ -36,8 +36,11 @@ PICTURES = DOCS / "pictures"
 GALLERY = DOCS / "gallery.md"
 NOTEBOOK = DOCS / "notebook.ipynb"
 LIMITS = DOCS / "limits.md"
+MATRIX = DOCS / "matrix.md"
 RESULTS = DOCS.parent / "results"
 MEASURED = RESULTS / "measured" / "measured.json"
+FULL = RESULTS / "full"
+SHOWN = 20  # methods of the matrix in its table
 DEMANDS = RESULTS / "recovery" / "must-reach.csv"
 # The held-out part that is drawn, where a case has several.
 CASES = {
@@ -45,18 +48,19 @@ CASES = {
     "rocket-camoes": "last 40 %", "rocket-erebus": "last 40 %", "cascaded-tanks": "validation", "silverbox": "arrow",
     "emps": "pulses",
 }  # fmt: skip
-BLOCK = re.compile(r"(<!-- (measured|recovery): (\S+) -->\n).*?(<!-- end -->)", re.DOTALL)
+BLOCK = re.compile(r"(<!-- (measured|recovery|matrix): (\S+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
 def with_tables(page: str) -> str:
-    """A page with what stands between its marks as the stored results have it: the table of a measured case, or the
-    demands of the recovery benchmark.
+    """A page with what stands between its marks as the stored results have it: the table of a measured case, the
+    demands of the recovery benchmark, or what the full matrix says.
     """
+    made = {"demands": demands, "verdict": sentences, "methods": methods}
     rows = gallery.stored(MEASURED)
 
     def filled(found: re.Match[str]) -> str:
         own = [row for row in rows if row["case"] == found[3]]
-        text = demands() if found[2] == "recovery" else gallery.table(own)
+        text = gallery.table(own) if found[2] == "measured" else made[found[3]]()
         return f"{found[1]}\n{text}\n\n{found[4]}"
 
     return BLOCK.sub(filled, page)
@@ -76,9 +80,29 @@ def demands() -> str:
     return markdown(cells)
 
 
+def sentences() -> str:
+    """The verdict of the full matrix, as a list."""
+    said = (FULL / "verdict.txt").read_text(encoding="utf-8").split("\n\n")
+    return "\n".join(f"- {sentence.strip()}" for sentence in said)
+
+
+def methods() -> str:
+    """The first methods of the full matrix by mean rank, tuned, as a Markdown table."""
+    with (FULL / "tables" / "methods.csv").open(encoding="utf-8", newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["mean_rank"] and row["variant"] == "tuned"]
+    cells = [["method", "kind", "state error over the EKF's", "95 %", "error of d", "NEES", "µs a step", "failed"]]
+    for row in rows[:SHOWN]:
+        ratio, low, high, d = (f"{float(row[key]):.2f}" for key in ("ratio", "ratio_low", "ratio_high", "d_nrmse"))
+        nees = f"{float(row['nees']):.2f}" if row["nees"] else "–"
+        failed = f"{row['failed']} of {row['ran']}"
+        name = f"`{row['estimator']}`"
+        cells.append([name, row["kind"], ratio, f"{low} to {high}", d, nees, f"{float(row['step_us']):.0f}", failed])
+    return markdown(cells)
+
+
 def tables() -> None:
-    """Write the tables of the gallery and of the limits."""
-    for page in (GALLERY, LIMITS):
+    """Write the tables of the gallery, of the limits and of the matrix."""
+    for page in (GALLERY, LIMITS, MATRIX):
         write_whole(page, with_tables(page.read_text(encoding="utf-8")))
 
 

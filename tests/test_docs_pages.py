@@ -61,7 +61,7 @@ def pictures() -> Any:
     return module
 
 
-@pytest.mark.parametrize("page", ["gallery.md", "limits.md"])
+@pytest.mark.parametrize("page", ["gallery.md", "limits.md", "matrix.md"])
 def test_tables_of_a_page_are_those_of_the_stored_results(page: str) -> None:
     """Mend by `python docs/pictures.py --tables`, and the pictures by `tox run -e pictures`."""
     made = pictures()

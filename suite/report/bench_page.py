@@ -29,7 +29,7 @@ POINTS = 50_000  # of all curves of the pictures of cases together, at about 12 
 
 
 def write(rows: Sequence[Row], tunings: Sequence[Mapping[str, Any]], folder: Path, store: str) -> dict[str, Any]:
-    """Write report.html, figures/*.svg and the tables; {"verdict": sentences, "files": paths}."""
+    """Write report.html, verdict.txt, figures/*.svg and the tables; {"verdict": sentences, "files": paths}."""
     rows = [row for row in rows if row.get("kind") != "recovery"]
     c = compare(rows)
     if not c.rows:
@@ -46,7 +46,8 @@ def write(rows: Sequence[Row], tunings: Sequence[Mapping[str, Any]], folder: Pat
     sentences = findings.verdict(c)
     matrices = [found for variant in ("tuned", "default") if (found := matrix(c, variant)) is not None]
     write_whole(folder / "report.html", _page(c, rows, sentences, matrices, pictures, drawn, figures, store))
-    files = [folder / "report.html", *(folder / "figures" / f"{name}.svg" for name in drawn)]
+    write_whole(folder / "verdict.txt", "\n\n".join(sentences) + "\n")
+    files = [folder / "report.html", folder / "verdict.txt", *(folder / "figures" / f"{name}.svg" for name in drawn)]
     files += _tables(c, rows, matrices, points, folder)
     return {"verdict": sentences, "files": [str(path) for path in files]}
 
