@@ -11,7 +11,7 @@ from suite.discovery.colour import coloured
 from suite.discovery.excerpt import excerpt
 from suite.discovery.fit import Hypothesis, prepare
 from suite.discovery.identify import ALARM, Search, search
-from suite.discovery.library import candidates
+from suite.discovery.library import MANY_STATES, candidates
 from suite.discovery.long import LONG, search_long
 from suite.discovery.outcome import curve, describe, errors, idle, parameters, white
 from suite.discovery.result import Candidate, Verdict
@@ -76,6 +76,9 @@ def judge(found: Search) -> tuple[Verdict, Hypothesis]:
         advice = (*advice, words.colour(names, problem.colour.tolist()))
     if problem.dropped:
         advice = (*advice, words.outliers(problem.dropped))
+    states = len(problem.model.states)
+    if states > MANY_STATES:
+        advice = (*advice, words.many(states, len(problem.terms), len((found.block or found).fitted)))
     advice = (*advice, *stated.advice(found, named, verdict.error))
     verdict = replace(verdict, advice=advice, sentence=words.sentence(verdict, problem, weighing.settled))
     return replace(verdict, seconds=found.seconds + time.perf_counter() - began), named

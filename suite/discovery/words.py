@@ -123,6 +123,14 @@ def excerpt(samples: int, used: int, pieces: int, whole: bool | None = None) -> 
     )
 
 
+def many(states: int, tried: int, refitted: int) -> str:
+    """What was tried of a large model."""
+    return (
+        f"{tried} candidates were scored and {refitted} hypotheses refitted; of a model with {states} states, "
+        "couplings are tried only between states that an equation connects already."
+    )
+
+
 def separate(best: Sequence[str], rival: Sequence[str], apart: float, times: str) -> str:
     """What it would take to tell two hypotheses apart."""
     return (
