@@ -33,7 +33,8 @@ NAMED = ("numpy", "scipy", "numba", "llvmlite", "filterpy", "casadi", "jax", "py
 
 def pytest_benchmark_update_machine_info(config: pytest.Config, machine_info: dict[str, Any]) -> None:
     """Versions of what is compared beside the machine, and nothing that names it."""
-    machine_info.pop("node", None)
+    for name in ("node", "release"):
+        machine_info.pop(name, None)
     versions = {}
     for name in NAMED:
         try:
@@ -68,15 +69,16 @@ class Ratio:
     def __call__(
         self, what: str, ours: Callable[[], Any], peer: str, theirs: Callable[[], Any], *, unit: str = "pass",
         per: int = 1, at_least: float | None = None, at_most: float | None = None, rounds: int = 20, turns: int = 5,
+        slow: bool = False,
     ) -> float:  # fmt: skip
         """Peer's time over ours, or with `at_most` ours over the peer's; `per` units in a call.
 
-        Both are called once before, which compiles what is compiled. Asserts what is wanted.
+        Both are called once before, which compiles what is compiled; a `slow` peer is called once in all. Asserts what
+        is wanted.
         """
-        theirs()
-        times = self.timed(theirs, turns)
+        times = [] if slow else self.timed(theirs, turns + 1)[1:]
         self.benchmark.pedantic(ours, rounds=rounds, warmup_rounds=1)
-        times += self.timed(theirs, turns)
+        times += self.timed(theirs, 1 if slow else turns)
         mine, other = self.benchmark.stats.stats.min / per, min(times) / per
         ratio = mine / other if at_most else other / mine
         reached = ratio <= at_most if at_most else ratio >= (at_least or 1.0)

@@ -21,13 +21,18 @@ def shown(seconds: float) -> str:
     return f"{seconds / scale:.3g} {unit}"
 
 
+def _digits(ratio: float) -> str:
+    """Three digits, and no exponent."""
+    return f"{ratio:,.0f}" if ratio >= 100.0 else f"{ratio:.3g}"
+
+
 def row(entry: dict[str, Any]) -> str:
     """One comparison; a ratio below 1 is a peer that is ahead."""
     note = entry["extra_info"]
     ours, theirs, ratio = f"{shown(note['ours'])} a {note['unit']}", "", ""
     if "peer" in note:
         theirs, faster = f"{shown(note['theirs'])}, {note['peer']}", note["theirs"] / note["ours"]
-        ratio = f"{faster:.3g} times as fast" if faster >= 1.0 else f"{1.0 / faster:.2g} times the time"
+        ratio = f"{_digits(faster)} times as fast" if faster >= 1.0 else f"{1.0 / faster:.2g} times the time"
     return f"| {note['what']} | {ours} | {theirs} | {ratio} | {note['wanted']} | {'yes' if note['reached'] else 'no'} |"
 
 

@@ -53,5 +53,5 @@ def test_the_extended_filter_against_the_unscented_one_of_filterpy(plants: Simpl
     ours, theirs, steps = _passes(plants, n, unscented)
     ratio(
         f"extended Kalman filter, n = {n}", ours, "filterpy's UKF", theirs, unit="step", per=steps,
-        at_least=200.0 if n == 2 else None, turns=3 if n < 20 else 1,
+        at_least=200.0 if n == 2 else None, turns=2, slow=n > 6,
     )  # fmt: skip
