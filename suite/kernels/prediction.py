@@ -15,6 +15,8 @@ from suite.kernels.cache import compile_kernel
 from suite.kernels.integrate import WORK
 from suite.kernels.step import step as move
 
+DENSE = 16  # states up to which a product with zeros costs less than to look for them
+
 # Hp (outputs, parameters), Hx (outputs, n), y (outputs,); x (n,); P, P2 (n, n); S, S2, T (n, n + columns)
 FILTER_WORK = nb.types.Tuple(
     (nb.VECTOR, nb.VECTOR, nb.MATRIX, nb.MATRIX, nb.MATRIX, nb.MATRIX, nb.MATRIX, nb.MATRIX, nb.MATRIX, nb.VECTOR)
@@ -87,14 +89,28 @@ def prediction_errors(
                             if slope != 0.0:
                                 for j in range(n):
                                     P2[i, j] += slope * P[l, j]
-                    for i in range(n):
-                        for j in range(i + 1):
-                            total = 0.0
+                    if n <= DENSE:
+                        for i in range(n):
+                            for j in range(i + 1):
+                                total = 0.0
+                                for l in range(n):
+                                    total += P2[i, l] * T[j, l]
+                                P[i, j] = total
+                                P[j, i] = total
+                            P[i, i] += Q[i] * dt
+                    else:
+                        # The same sums without the zeros of T: within a sample a state reaches few others.
+                        for j in range(n):
+                            for i in range(j, n):
+                                P[i, j] = 0.0
                             for l in range(n):
-                                total += P2[i, l] * T[j, l]
-                            P[i, j] = total
-                            P[j, i] = total
-                        P[i, i] += Q[i] * dt
+                                slope = T[j, l]
+                                if slope != 0.0:
+                                    for i in range(j, n):
+                                        P[i, j] += P2[i, l] * slope
+                            P[j, j] += Q[j] * dt
+                            for i in range(j, n):
+                                P[j, i] = P[i, j]
             output(t[step], xv, u[step], p, on, yv, Hx, Hp)
             for c in range(ny):
                 Y[step, c] = yv[c]
