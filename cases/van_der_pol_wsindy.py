@@ -1,6 +1,6 @@
 """The Van der Pol oscillator of the weak-form sparse regression, without its nonlinear damping.
 
-The polynomials that the publication chose from hold what is missing; so does this model's own effect, beside the library.
+The polynomials that the publication chose from hold what is missing; so does this model's own effect.
 """
 
 from suite.case import Case, Experiment, Missing
