@@ -155,26 +155,25 @@ def tell(row: dict[str, Any]) -> None:
 
 def table(report: dict[str, Any]) -> str:
     """Both tables in Markdown, and where and when they were measured."""
-    rows = ["| Samples | File | Command | Processor | Wall | Memory | Says |", "|---|---|---|---|---|---|---|"]
+    rows = ["| Samples | File | Command | Processor | Memory | Says |", "|---|---|---|---|---|---|"]
     for row in report["lengths"]:
         said = ", ".join(row["effects"]) if "effects" in row else f"error {row['error']['pos']:.3g}"
         rows.append(
             f"| {row['samples']:,} | {row['kind']}, {row['megabytes']:.3g} MB | {row['verb']} | {row['cpu_s']:.3g} s | "
-            f"{row['wall_s']:.3g} s | {row['peak_mib']:.0f} MiB | {said} |"
+            f"{row['peak_mib']:.0f} MiB | {said} |"
         )
     rows += [
         "",
-        "| States | Candidates | Samples | Processor | Wall | Memory | Says |",
-        "|---|---|---|---|---|---|---|",
+        "| States | Candidates | Samples | Processor | Memory | Says |",
+        "|---|---|---|---|---|---|",
     ]
     rows += [
-        f"| {row['states']} | {row['candidates']} | {row['samples']} | {row['cpu_s']:.3g} s | {row['wall_s']:.3g} s | "
+        f"| {row['states']} | {row['candidates']} | {row['samples']} | {row['cpu_s']:.3g} s | "
         f"{row['peak_mib']:.0f} MiB | {', '.join(row['effects']) or row['verdict']} |"
         for row in report["states"]
     ]
-    # Where others had the processors too, wall times are theirs as well.
-    load = f"load average at the start {report['load']:.2g}"
-    return "\n".join([*rows, "", f"Measured on {report['machine']}; {report['versions']}; {report['date']}; {load}."])
+    # Wall times stay in the report: where others have the processors too, they are theirs as well.
+    return "\n".join([*rows, "", f"Measured on {report['machine']}; {report['versions']}; {report['date']}."])
 
 
 def main() -> None:
