@@ -76,10 +76,9 @@ def driven(samples: int) -> dict[str, Array]:
 def write(path: Path, columns: dict[str, Array]) -> None:
     """A table as CSV or parquet, by its suffix; of any length."""
     import pyarrow as pa
-    import pyarrow.csv
-    import pyarrow.parquet
+    from pyarrow import csv, parquet
 
-    save = pa.csv.write_csv if path.suffix == ".csv" else pa.parquet.write_table
+    save = csv.write_csv if path.suffix == ".csv" else parquet.write_table
     save(pa.table(columns), path)
 
 
