@@ -120,6 +120,8 @@ def main() -> int:
     parser.add_argument("--json", type=Path, help="where the whole report goes")
     parser.add_argument("--here", type=Path, help=argparse.SUPPRESS)
     args = parser.parse_args()
+    # The modules beside this one, also where Python is told not to look there (PYTHONSAFEPATH).
+    sys.path.insert(0, str(Path(__file__).parent))
     if args.here is not None and args.guided:
         guided(args.target[0], args.seconds, args.here)
     if args.here is not None:
