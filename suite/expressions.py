@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import ast
 import math
-import re
 import warnings
 from collections.abc import Callable, Collection, Sequence
 from functools import lru_cache
@@ -19,13 +18,24 @@ from typing import Any
 import sympy
 from sympy.printing.str import StrPrinter
 
+from suite.bracketing import DEEPEST, nesting
 from suite.errors import ModelError
 
 LONGEST = 10_000
-DEEPEST = 100
 LAYERS = 16  # functions, powers and quotients within each other; sympy's effort grows steeply with them
 LARGEST_EXPONENT = 64
 LONG = 2**53  # above it a whole number is not exact in floating point
+
+
+def _abs(e: sympy.Expr) -> sympy.Expr:
+    """The absolute value. Of a power whose exponent it cannot see to be real sympy takes real and imaginary parts; here
+    all numbers are real.
+    """
+    found = sympy.Abs(e)
+    if found.has(sympy.re, sympy.im):
+        found = found.replace(sympy.im, lambda _: sympy.S.Zero).replace(sympy.re, lambda part: part)
+    return found
+
 
 FUNCTIONS: dict[str, tuple[int, Callable[..., sympy.Expr]]] = {
     "sin": (1, sympy.sin),
@@ -41,15 +51,13 @@ FUNCTIONS: dict[str, tuple[int, Callable[..., sympy.Expr]]] = {
     "exp": (1, sympy.exp),
     "log": (1, sympy.log),
     "sqrt": (1, sympy.sqrt),
-    "abs": (1, sympy.Abs),
+    "abs": (1, _abs),
     "sign": (1, sympy.sign),
     "min": (2, sympy.Min),
     "max": (2, sympy.Max),
 }
 CONSTANTS = {"pi": sympy.pi}
 TIME = "t"
-TOKEN = re.compile(r"\*\*|[-+~*/%@,()\[\]{}]|[^-+~*/%@,()\[\]{}\s]+")
-OPENING = frozenset(["(", "[", "{", "+", "-", "~", "*", "/", "%", "@", ",", "**"])  # after these a sign is unary
 RESERVED = frozenset(FUNCTIONS) | frozenset(CONSTANTS) | {TIME}
 
 _FLOAT_OF: dict[str, Callable[..., Any]] = {
@@ -86,7 +94,7 @@ def _parsed(text: str, names: frozenset[str], where: str) -> sympy.Expr:
     line = " ".join(text.split()).replace("^", "**")
     if not line:
         raise ModelError(f"{where}: the equation is empty; write 0 for a rate of zero")
-    if _nesting(line) > DEEPEST:
+    if nesting(line) > DEEPEST:
         raise ModelError(f"{where}: more than {DEEPEST} nested brackets, signs or powers; simplify the equation")
     try:
         with warnings.catch_warnings():
@@ -131,33 +139,6 @@ def plain(expression: sympy.Expr) -> str:
 def latex(expression: sympy.Expr) -> str:
     """The expression as LaTeX."""
     return str(sympy.latex(expression))
-
-
-def _nesting(text: str) -> int:
-    """A bound of the syntax tree's depth, read off the characters; stops above DEEPEST.
-
-    Brackets nest; without a bracket so do signs (----x) and powers (x**y**z), until a sum, product or comma.
-    """
-    chains = [0]
-    depth = deepest = 0
-    operand = False
-    for token in TOKEN.findall(text):
-        if token in "([{":
-            chains.append(0)
-            depth += 1
-        elif token in ")]}":
-            depth -= chains.pop() + 1 if len(chains) > 1 else 0
-        elif token == "**" or (token in "+-~" and not operand):
-            chains[-1] += 1
-            depth += 1
-        elif token in "+-~*/%@,":
-            depth -= chains[-1]
-            chains[-1] = 0
-        operand = token not in OPENING
-        deepest = max(deepest, depth)
-        if deepest > DEEPEST:
-            break
-    return deepest
 
 
 def _short(text: str) -> str:
