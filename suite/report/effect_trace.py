@@ -15,6 +15,7 @@ import numpy.typing as npt
 import sympy
 
 from suite import expressions
+from suite.bracketing import TOKEN
 from suite.effect import Effect
 
 Array = npt.NDArray[np.float64]
@@ -189,7 +190,7 @@ def _scale(effect: Effect, name: str, variable: Array, motion: Motion) -> float:
 
 
 def _holds(text: str, name: str) -> bool:
-    return name in expressions.TOKEN.findall(text)
+    return name in TOKEN.findall(text)
 
 
 def _function(
