@@ -13,7 +13,7 @@ import math
 import warnings
 from collections.abc import Callable, Collection, Sequence
 from functools import lru_cache
-from typing import Any
+from typing import Any, cast
 
 import sympy
 from sympy.printing.str import StrPrinter
@@ -31,10 +31,10 @@ def _abs(e: sympy.Expr) -> sympy.Expr:
     """The absolute value. Of a power whose exponent it cannot see to be real sympy takes real and imaginary parts; here
     all numbers are real.
     """
-    found = sympy.Abs(e)
+    found: Any = sympy.Abs(e)
     if found.has(sympy.re, sympy.im):
         found = found.replace(sympy.im, lambda _: sympy.S.Zero).replace(sympy.re, lambda part: part)
-    return found
+    return cast(sympy.Expr, found)
 
 
 FUNCTIONS: dict[str, tuple[int, Callable[..., sympy.Expr]]] = {
