@@ -27,6 +27,7 @@ CREATE TABLE IF NOT EXISTS taken (key TEXT PRIMARY KEY, run TEXT NOT NULL);
 """
 CELL = '"case", noise, estimator, variant, seed'
 # How a user says where the store is, for the sentences that ask for another place.
+ATTEMPTS = 200  # to open a file that another process lays out, 50 ms apart
 ELSEWHERE = "name another file with --store"
 
 
@@ -44,10 +45,21 @@ class Store:
             # A writer waits for its turn up to a minute.
             self.connection = sqlite3.connect(path, timeout=60.0, isolation_level=None)
             try:
-                self._open()
+                self._open_in_turn()
             except (sqlite3.Error, InputError):
                 self.connection.close()
                 raise
+
+    def _open_in_turn(self) -> None:
+        """Two that lay out a new file at once: one is refused without waiting, since both hold what the other needs."""
+        for _ in range(ATTEMPTS):
+            try:
+                return self._open()
+            except sqlite3.OperationalError as error:
+                if "locked" not in str(error):
+                    raise
+                time.sleep(0.05)
+        return self._open()
 
     def _open(self) -> None:
         """Refuse another layout before anything is written, then lay out what is not there."""
