@@ -248,6 +248,8 @@ class _Translator:
 
     def power(self, base: Any, exponent: sympy.Expr) -> sympy.Expr:
         if not exponent.is_number:
+            if base.is_number and self.finite(lambda: float(base)) <= 0.0:
+                raise self.refuse(f"{float(base):g} to a power that varies has no real value", "use a positive base")
             return self.bounded(base**exponent)
         value = self.finite(lambda: float(exponent))
         # sympy merges (x**64)**64 to one power, so that towers of small exponents count as one large one.

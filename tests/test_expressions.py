@@ -62,6 +62,8 @@ HOSTILE = {
     "huge whole number": "*".join(["9007199254740991"] * 400),
     "division by zero": "x/(2 - 2)",
     "root of a negative": "sqrt(-1)",
+    "a negative base": "(-1)**x",
+    "a base of zero": "(v - v)**x",
     "unknown function": "eval(x)",
     "a function's name alone": "sin",
     "argument count": "sin(x, v)",
