@@ -250,7 +250,7 @@ class _Translator:
         if not exponent.is_number:
             if base.is_number and self.finite(lambda: float(base)) <= 0.0:
                 raise self.refuse(f"{float(base):g} to a power that varies has no real value", "use a positive base")
-            return self.bounded(base**exponent)
+            return self.real(self.bounded(base**exponent))
         value = self.finite(lambda: float(exponent))
         # sympy merges (x**64)**64 to one power, so that towers of small exponents count as one large one.
         inner = float(base.exp) if base.is_Pow and base.exp.is_number else 1.0
@@ -258,7 +258,7 @@ class _Translator:
             raise self.refuse(f"an exponent of {value * inner:g} is too large", f"use at most {LARGEST_EXPONENT}")
         if base.is_number:
             return self.number(self.finite(lambda: float(base) ** value))
-        return self.bounded(base ** (sympy.Integer(int(value)) if value == int(value) else exponent))
+        return self.real(self.bounded(base ** (sympy.Integer(int(value)) if value == int(value) else exponent)))
 
     def call(self, name: str, nodes: Sequence[ast.expr]) -> sympy.Expr:
         if name not in FUNCTIONS:
@@ -270,7 +270,13 @@ class _Translator:
         arguments = [self.inner(node) for node in nodes]
         if all(argument.is_number for argument in arguments):
             return self.number(self.finite(lambda: _FLOAT_OF[name](*(float(a) for a in arguments))))
-        return function(*arguments)
+        return self.real(function(*arguments))
+
+    def real(self, expression: sympy.Expr) -> sympy.Expr:
+        """The expression; refused where sympy sees a root of what is never positive, such as sqrt(-2*x**2)."""
+        if expression.has(sympy.I):
+            raise self.refuse("a root or power of a negative number has no real value", "check the signs")
+        return expression
 
     def finite(self, compute: Callable[[], float]) -> float:
         """A constant folded in floating point; complex, infinite and undefined constants are refused."""

@@ -63,6 +63,8 @@ HOSTILE = {
     "division by zero": "x/(2 - 2)",
     "root of a negative": "sqrt(-1)",
     "a negative base": "(-1)**x",
+    "root of what is never positive": "max(sqrt(-2*x*x), v)",
+    "power of what is never positive": "(-0.9*exp(x))**1.26",
     "a base of zero": "(v - v)**x",
     "unknown function": "eval(x)",
     "a function's name alone": "sin",
