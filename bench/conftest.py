@@ -13,18 +13,13 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-# One thread a library, before any of them is loaded; the plants are small.
-for _name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"):
-    os.environ.setdefault(_name, "1")
-os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1")
+import numpy as np
+import numpy.typing as npt
+import pytest
 
-import numpy as np  # noqa: E402  (after the settings)
-import numpy.typing as npt  # noqa: E402
-import pytest  # noqa: E402
-
-from suite.case import Case, Experiment  # noqa: E402
-from suite.model import Initial, Model, Output, Parameter  # noqa: E402
-from suite.record import Prior, Record  # noqa: E402
+from suite.case import Case, Experiment
+from suite.model import Initial, Model, Output, Parameter
+from suite.record import Prior, Record
 
 Array = npt.NDArray[np.float64]
 

@@ -88,3 +88,24 @@ def test_a_silent_run_holds_nothing(tmp_path: Path) -> None:
         assert theirs.take("a")
         store.execute("UPDATE runs SET beat = 0 WHERE run = ?", (theirs.run,))
         assert mine.take("a")
+
+
+@pytest.mark.parametrize(("said", "waits"), [("database is locked", True), ("disk I/O error", False)])
+def test_who_lays_out_a_new_store_beside_another_waits_for_its_turn(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, said: str, waits: bool
+) -> None:
+    """SQLite refuses one of two that switch a new file to its log at once, without waiting; other errors stand."""
+    errors = [sqlite3.OperationalError(said)] * 2
+    opened = Store._open
+
+    def open_later(store: Store) -> None:
+        if errors:
+            raise errors.pop()
+        opened(store)
+
+    monkeypatch.setattr(Store, "_open", open_later)
+    if waits:
+        assert _reasons(Store(_filled(tmp_path / "new.sqlite", {0: "kept"}))) == {0: "kept"}
+    else:
+        with pytest.raises(InputError, match=said):
+            Store(tmp_path / "new.sqlite")

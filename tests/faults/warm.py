@@ -12,9 +12,11 @@ import os
 import subprocess
 import sys
 import time
+import traceback
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 from process import Command, Ended
 
@@ -93,14 +95,14 @@ def _become(words: Sequence[str], folder: Path, out: Path, err: Path) -> int:
         os.dup2(handle, number)
         os.close(handle)
     context = multiprocessing.get_context("fork")
-    multiprocessing.get_context = lambda method=None: context  # type: ignore[assignment]
+    mock.patch.object(multiprocessing, "get_context", return_value=context).start()
     sys.argv = ["unmodelled", *words]
     try:
         code = main()
     except SystemExit as stopped:
         code = int(stopped.code or 0)
     except BaseException:
-        sys.excepthook(*sys.exc_info())  # type: ignore[arg-type]
+        traceback.print_exc()
         code = 1
     multiprocessing.util._exit_function()
     sys.stdout.flush()

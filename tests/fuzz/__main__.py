@@ -56,7 +56,8 @@ def run(target: str, seconds: float, examples: int | None, seed: int) -> dict[st
             batch()
             left -= count
             seed += 1
-        getattr(attempt, "close", lambda: None)()
+        for close in oracle.at_end:
+            close()
     return oracle.to_json()
 
 

@@ -88,10 +88,10 @@ strategy = st.tuples(files(), st.sampled_from(["run.csv", "run.csv", "run.tsv", 
 
 def prepare(oracle: Oracle, folder: Path) -> Any:
     """The file as a record of a model."""
+    return lambda given: read(oracle, folder / given[1], given[0])
 
-    def attempt(given: tuple[bytes, str]) -> None:
-        path = folder / given[1]
-        path.write_bytes(given[0])
-        oracle.check(lambda: read_record(path, MODEL), repr(given), path)
 
-    return attempt
+def read(oracle: Oracle, path: Path, given: bytes) -> None:
+    """What was drawn, written to a file and read as a record of a model."""
+    path.write_bytes(given)
+    oracle.check(lambda: read_record(path, MODEL), f"{path.name}: {given!r}", path)

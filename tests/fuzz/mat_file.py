@@ -11,12 +11,10 @@ from typing import Any
 import numpy as np
 import scipy.io
 import scipy.sparse
-from csv_file import MODEL
+from csv_file import read
 from hypothesis import strategies as st
 from mutations import bytewise
 from oracle import Oracle
-
-from suite.readers import read_record
 
 RISING = np.arange(6.0)
 VARIABLES: dict[str, Any] = {
@@ -85,10 +83,4 @@ strategy = files()
 
 def prepare(oracle: Oracle, folder: Path) -> Any:
     """The file as a record of a model."""
-    path = folder / "run.mat"
-
-    def attempt(given: bytes) -> None:
-        path.write_bytes(given)
-        oracle.check(lambda: read_record(path, MODEL), given, path)
-
-    return attempt
+    return lambda given: read(oracle, folder / "run.mat", given)

@@ -78,6 +78,7 @@ class Oracle:
     answers: Counter[str] = field(default_factory=Counter)
     slowest: float = 0.0
     findings: dict[str, Finding] = field(default_factory=dict)
+    at_end: list[Callable[[], None]] = field(default_factory=list)
     _armed: bool = False
     _allowed: tuple[str, ...] = ()
     _seen: list[str] = field(default_factory=list)

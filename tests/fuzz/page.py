@@ -173,5 +173,5 @@ def prepare(oracle: Oracle, folder: Path) -> Any:
         if "Traceback (" in heard or "failed" in heard:
             oracle.note("the server printed a failure", "", heard[-500:])
 
-    attempt.close = close  # type: ignore[attr-defined]
+    oracle.at_end.append(close)
     return attempt

@@ -11,12 +11,10 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from csv_file import MODEL
+from csv_file import read
 from hypothesis import strategies as st
 from mutations import bytewise, words
 from oracle import Oracle
-
-from suite.readers import read_record
 
 ROWS = 6
 TIMES = [datetime.datetime(2024, 1, 1, 0, 0, k) for k in range(ROWS)]
@@ -89,10 +87,4 @@ strategy = files()
 
 def prepare(oracle: Oracle, folder: Path) -> Any:
     """The file as a record of a model."""
-    path = folder / "run.parquet"
-
-    def attempt(given: bytes) -> None:
-        path.write_bytes(given)
-        oracle.check(lambda: read_record(path, MODEL), given, path)
-
-    return attempt
+    return lambda given: read(oracle, folder / "run.parquet", given)
