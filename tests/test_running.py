@@ -11,10 +11,11 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
-from suite.benchmark import pool
+from suite.benchmark import cluster, pool
 from suite.benchmark.store import Store
 from suite.benchmark.worker import Failure, Task
 from suite.errors import InputError
@@ -226,9 +227,9 @@ def test_a_worker_killed_at_rest_or_at_work_costs_one_task_at_most() -> None:
 def test_a_cluster_that_loses_a_worker_loses_no_cell(bench: Bench) -> None:
     """On a LocalCluster of processes, one killed at work: all cells are stored; a hang is a row."""
     distributed = pytest.importorskip("distributed", reason="the extra dask is not installed")
-    cluster = [sys.executable, "-c", CLUSTER]
+    command = [sys.executable, "-c", CLUSTER]
     process = subprocess.Popen(
-        cluster, env=bench.environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+        command, env=bench.environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
         text=True,
     )  # fmt: skip
     assert process.stdout is not None
@@ -265,10 +266,18 @@ if __name__ == "__main__":
 """
 
 
+def test_a_result_that_is_lost_with_its_worker_is_waited_for() -> None:
+    """A task whose result went with the worker before it was fetched runs again: that result counts."""
+    pytest.importorskip("distributed", reason="the extra dask is not installed")
+    again, ended = Mock(status="pending"), Mock(status="finished")
+    again.exception.return_value, again.result.return_value, ended.result.return_value = None, 7, 5
+    client = Mock(gather=lambda futures: [future.result() for future in futures])
+    found = cluster._outcomes(client, [again, ended], "tcp://there")  # pyright: ignore[reportPrivateUsage]
+    assert [outcome for _, outcome in found] == [7, 5]
+
+
 def test_no_cluster_is_a_sentence(bench: Bench) -> None:
     """An address where nothing listens."""
     pytest.importorskip("distributed", reason="the extra dask is not installed")
-    from suite.benchmark import cluster
-
     with pytest.raises(InputError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:9"):
         list(cluster.run([Task("os:getpid", ())], "tcp://127.0.0.1:9", 1.0, 600.0))

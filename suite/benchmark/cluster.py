@@ -122,10 +122,11 @@ def _outcomes(client: Any, futures: list[Any], address: str) -> Iterator[tuple[A
     ready = [future for future in futures if future.status == "finished"]
     results = dict(zip(ready, client.gather(ready), strict=True))
     for future in futures:
-        yield future, results[future] if future in results else _failure(future, address)
+        yield future, results[future] if future in results else _outcome(future, address)
 
 
-def _failure(future: Any, address: str) -> Failure:
+def _outcome(future: Any, address: str) -> Any:
+    """The Failure of what did not end well; the result of what had ended when its worker was lost, and ran again."""
     from distributed import KilledWorker
 
     if future.status == "cancelled" or future.status == "lost":
@@ -135,7 +136,7 @@ def _failure(future: Any, address: str) -> Failure:
         return Failure("error", "every Dask worker that ran it was lost, until Dask gave up")
     if isinstance(error, InputError):
         raise error
-    return Failure("error", f"{type(error).__name__}: {error}")
+    return future.result() if error is None else Failure("error", f"{type(error).__name__}: {error}")
 
 
 _own = threading.local()

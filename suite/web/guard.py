@@ -105,8 +105,11 @@ class Guard:
 
 
 async def _drained(receive: Receive, most: int) -> None:
-    """Read on and keep nothing: who is still sending when the connection is closed never sees the answer."""
-    left = most
+    """Read on and keep nothing: who is still sending when the connection is closed never sees the answer.
+
+    To twice the limit, so that whoever sends a little more than that is told; who sends without end is cut off.
+    """
+    left = 2 * most
     while left > 0:
         message = await receive()
         left -= len(message.get("body", b""))
