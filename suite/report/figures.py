@@ -172,7 +172,11 @@ def waterfall(ledger: Ledger) -> Figure:
             for place, value in zip(places, values, strict=True):
                 if not np.isnan(value):
                     said, height = (f"{value:.3g}", value) if np.isfinite(value) else ("diverged", noise)
-                    ax.annotate(said, (place, height), (0, 2), textcoords="offset points", ha="center", fontsize=small)
+                    ax.annotate(
+                        said, (place, height), (0, 4), textcoords="offset points", ha="center", fontsize=small,
+                        # The noise's line stops at the number.
+                        zorder=5, bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.3},
+                    )  # fmt: skip
         if noise > 0:
             ax.axhline(noise, color=INK, linestyle="--", linewidth=1.3, label="noise", zorder=4)
         if logarithmic:
