@@ -118,6 +118,12 @@ def test_a_difference_that_nobody_would_notice_is_no_victory() -> None:
     assert said[0].startswith("Neither side wins: the best Kalman filter and the best model-error estimator are level")
 
 
+def test_a_method_without_any_error_is_no_trouble() -> None:
+    """A plant that stands still is estimated exactly: a ratio of zero."""
+    said = findings.verdict(compare(_rows({"generalized-ie": 0.0, "ekf": 1.0})))
+    assert said[0].startswith("A model-error estimator beats the best Kalman filter: generalized-ie has 0.00 times")
+
+
 def test_the_champion_has_enough_seeds() -> None:
     """Who would rank before it on fewer is named beside it."""
     rows = _rows({"generalized-ie": 0.5, "ekf": 1.0, "conventional-ie": 0.4})

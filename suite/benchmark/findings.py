@@ -13,7 +13,7 @@ from suite.benchmark.statistics import holm, signed_rank
 
 KINDS = {"filter": "filters (causal)", "smoother": "smoothers (they also use later samples)"}
 TESTABLE = 6  # seeds from which one condition can decide at 5 %
-LEVEL_FROM = 1.02  # ratios between this and its inverse are no difference that anybody would notice
+EVEN = 1.02  # ratios between this and its inverse are no difference that anybody would notice
 FAMILIES = {"estimators": "model-error estimators", "baselines": "Kalman baselines"}
 
 
@@ -74,7 +74,7 @@ def _duel(c: Comparison) -> list[str]:
     p = signed_rank(dict(enumerate(found)), dict.fromkeys(range(len(found)), 1.0))
     winner = "A model-error estimator" if first is a else "A Kalman filter"
     other = "Kalman filter" if first is a else "model-error estimator"
-    if max(sizes[2], 1.0 / sizes[1]) < LEVEL_FROM:
+    if sizes[2] < EVEN and sizes[1] * EVEN > 1.0:
         lead = "Neither side wins: the best Kalman filter and the best model-error estimator are level"
     elif p < LEVEL:
         lead = f"{winner} beats the best {other}"
