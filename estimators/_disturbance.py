@@ -27,9 +27,8 @@ def disturbed(grow: Grow, model: Model, record: Record, q_scale: float, *, smoot
     grown, start = grow(model, record, prior, q_scale)
     run = filtered(grown, record, start.x0, start.P0, start.Q, start.R, spread=True)
     if run.failed_at is not None:
-        when = f"the filter diverged at t = {record.t[run.failed_at]:.4g} s; its last estimate is held from there"
         x = held(run.x, run.failed_at)
-        return Estimate(x=x[:, :n], d=spread_out(model, x)[0], status="diverged", note=when)
+        return Estimate(x=x[:, :n], d=spread_out(model, x)[0], status="diverged", note=run.failure(record.t))
     x, P = run.x, run.P
     if smooth:
         both = smoothed(run)

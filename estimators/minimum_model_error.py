@@ -47,9 +47,8 @@ class MinimumModelError(Estimator):
         status, note, rounds = "ok", "", 0
         run = filtered(model, record, prior.x0, prior.P0, noise, prior.R, spread=True)
         if run.failed_at is not None:
-            when = f"the filter diverged at t = {record.t[run.failed_at]:.4g} s; its last estimate is held from there"
             x = held(run.x, run.failed_at)
-            return Estimate(x=x, d=np.zeros_like(x), status="diverged", note=when)
+            return Estimate(x=x, d=np.zeros_like(x), status="diverged", note=run.failure(record.t))
         result, Phi = smoothed(run), run.Phi
         path, kick = result.x, result.after @ noise
         for rounds in range(1, ROUNDS + 1):

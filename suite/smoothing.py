@@ -8,9 +8,14 @@ import numpy as np
 import numpy.typing as npt
 
 from suite.filtering import Filtered
+from suite.kernels.ahead import ahead
+from suite.kernels.factored import WIDE
 from suite.kernels.smoother import adjoint, adjoint_workspace
+from suite.kernels.types import arrays
 
 Array = npt.NDArray[np.float64]
+
+LOST = 1e-6  # what is left of a variance where P - P Lambda P has lost its digits
 
 
 @dataclass(frozen=True)
@@ -38,6 +43,25 @@ def smoothed(run: Filtered) -> Smoothed:
     adjoint(
         run.Phi, run.H, run.K, run.innovation, run.variance, run.x, run.P, work, Xs, Ps, before, Before, after, After
     )  # fmt: skip
+    asked = _lost(run, Ps)
+    if asked.any():
+        room = (*np.zeros((4, n)), *np.zeros((4, n, n)))
+        ahead(
+            run.Phi, run.Qd, run.H, run.K, run.innovation, run.seen, *arrays(run.R), run.x, run.x_prior, run.P, asked,
+            room, Xs, Ps, before, Before, after,
+        )  # fmt: skip
     w = np.einsum("kij,kj->ki", run.Qd, before)
     P_w = run.Qd - run.Qd @ Before @ run.Qd
     return Smoothed(Xs, 0.5 * (Ps + Ps.transpose(0, 2, 1)), w, P_w, before, Before, after)
+
+
+def _lost(run: Filtered, Ps: Array) -> npt.NDArray[np.bool_]:
+    """The samples (N,) of which the adjoint cannot be trusted, whose P - P Lambda P is Ps (N, n, n).
+
+    Those up to the last one at which the state was unknown beside the sensor, and those whose difference is too small.
+    """
+    wide = np.flatnonzero((run.seen & (run.variance > WIDE * run.R)).any(axis=1))
+    variances, left = (np.diagonal(matrices, axis1=1, axis2=2) for matrices in (run.P, Ps))
+    lost = np.array(((left < LOST * variances) | (left > (1.0 + LOST) * variances)).any(axis=1))
+    lost[: wide.max(initial=-1) + 1] = True
+    return lost

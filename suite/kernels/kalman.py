@@ -1,7 +1,8 @@
 """The extended Kalman filter: one compiled pass that stores what a smoother needs.
 
 The measured channels of a sample are taken one at a time at one linearisation, which is the joint update without an
-inverse:  s = H P H' + R,  K = P H' / s,  x += K nu,  P -= K s K',  nu = y - h(x-) - H (x - x-).
+inverse:  s = H P H' + R,  K = P H' / s,  x += K nu,  P -= K s K',  nu = y - h(x-) - H (x - x-);
+P by its factors where that difference would lose it.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy.typing as npt
 
 from suite.kernels import types as nb
 from suite.kernels.cache import compile_kernel
+from suite.kernels.factored import FAR, WIDE, measured
 from suite.kernels.integrate import WORK
 from suite.kernels.matrix import multiply, transpose
 from suite.kernels.step import step
@@ -71,7 +73,7 @@ def ekf(
     x0: Any, P0: Any, p: Any, on: Any, Q: Any, spread: int, R: Any, angle: Any, none: Any, work: Any, ekf_work: Any,
     X: Any, P: Any, Xp: Any, Pp: Any, Phi: Any, Qd: Any, H: Any, K: Any, nu: Any, s: Any,
 ) -> int:  # fmt: skip
-    """Run over one run; returns -1, or the first sample at which a number is no longer finite.
+    """Run over one run; returns -1, or the first sample at which a number is no longer finite, or too large to tell.
 
     own: the model's own step (see `step`) or 0; t (N,), u (N, inputs), y (N, outputs; NaN is missing), nominal,
     departure (N, n): where to linearise the output at a sample and the step from it if `around`, else at the filter's
@@ -121,6 +123,7 @@ def ekf(
                 C[i, j] = Pp[k, i, j]
             base[i] = nominal[k, i] if around != 0 else x[i]
         output(t[k], base, u[k], p, on, yv, H[k], Hp)
+        sound = True
         for c in range(ny):
             nu[k, c] = 0.0
             s[k, c] = 1.0
@@ -143,15 +146,20 @@ def ekf(
                         gain[i] += C[j, i] * slope
             for i in range(n):
                 variance += h[i] * gain[i]
+            wide = variance > WIDE * R[c] or variance < R[c]
+            if wide:
+                variance = measured(C, h, R[c], M, gain)
+                sound = sound and variance <= FAR * R[c]
             nu[k, c] = e
             s[k, c] = variance
             for i in range(n):
                 gain[i] /= variance
                 x[i] += gain[i] * e
+            if wide:
+                continue
             for i in range(n):
                 for j in range(n):
                     C[i, j] -= gain[i] * gain[j] * variance
-        sound = True
         for i in range(n):
             X[k, i] = x[i]
             sound = sound and math.isfinite(x[i])

@@ -12,6 +12,7 @@ from typing import Any
 
 from suite.kernels import types as nb
 from suite.kernels.cache import compile_kernel
+from suite.kernels.factored import WIDE, measured
 from suite.kernels.integrate import WORK
 from suite.kernels.step import step as move
 
@@ -137,6 +138,9 @@ def prediction_errors(
                         for j in range(n):
                             K[i] += P[i, j] * Hx[c, j]
                         variance += Hx[c, i] * K[i]
+                wide = noisy and (variance > WIDE * R[c] or variance < R[c])
+                if wide:
+                    variance = measured(P, Hx[c], R[c], P2, K)
                 root = math.sqrt(variance)
                 e[step, c] = nu / root
                 s[step, c] = variance
@@ -158,6 +162,8 @@ def prediction_errors(
                         for j in range(width):
                             # S -= K (H S) with H S = -J root
                             S[i, j] += gain * J[step, c, j] * root
+                    if wide:
+                        continue
                     for i in range(n):
                         for j in range(n):
                             P[i, j] -= K[i] * K[j] / variance
