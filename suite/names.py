@@ -4,18 +4,42 @@ from __future__ import annotations
 
 import keyword
 import re
-from typing import TYPE_CHECKING
+from collections.abc import Collection, Mapping
+from typing import Protocol
 
 from suite import expressions
 from suite.errors import ModelError
 
-if TYPE_CHECKING:
-    from suite.model import Model
-
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}\Z")
 
 
-def check_names(model: Model) -> None:
+class Delayed(Protocol):
+    """An input, as far as its names go."""
+
+    @property
+    def delay(self) -> str | None: ...
+
+
+class Named(Protocol):
+    """A model, as far as its names go."""
+
+    @property
+    def source(self) -> str: ...
+    @property
+    def states(self) -> Mapping[str, object]: ...
+    @property
+    def parameters(self) -> Mapping[str, object]: ...
+    @property
+    def inputs(self) -> Mapping[str, Delayed]: ...
+    @property
+    def initial(self) -> Mapping[str, object]: ...
+    @property
+    def suspect(self) -> Collection[str] | None: ...
+    @property
+    def units(self) -> Mapping[str, object]: ...
+
+
+def check_names(model: Named) -> None:
     """Raise ModelError at the first name that is no name, is taken, or belongs to nothing."""
     if not model.states:
         raise ModelError(f'{model.source}: no states; add a table [states] with one rate a line, such as x = "-k*x"')

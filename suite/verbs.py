@@ -19,10 +19,11 @@ from suite.discovery.adding import added
 from suite.discovery.evidence import evidence
 from suite.discovery.excerpt import excerpt
 from suite.discovery.fit import fit, prepare
+from suite.discovery.growing import grown
 from suite.discovery.library import candidates
 from suite.discovery.loop import discover as loop
 from suite.discovery.result import Verdict
-from suite.discovery.terms import Term, grown
+from suite.discovery.terms import Term
 from suite.discovery.verdict import diagnose as verdict_on
 from suite.discovery.words import effect as effect_words
 from suite.discovery.words import headline, value_sd, weight

@@ -112,7 +112,7 @@ def _effect(args: argparse.Namespace, model: Model, record: Record) -> tuple[Mod
     """The model with the effect, its coefficients' names, and the equation; inner scales are where a search starts."""
     if args.effect is None:
         return None, (), ""
-    from suite.discovery.terms import grown
+    from suite.discovery.growing import grown
     from suite.verbs import chosen_term, start_numbers
 
     term = chosen_term(model, args.effect, args.equation, args.term)

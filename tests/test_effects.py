@@ -16,9 +16,10 @@ from suite import plugins
 from suite.discovery.engine import Problem
 from suite.discovery.fit import EXACT, prepare
 from suite.discovery.frame import Layout, Point
+from suite.discovery.growing import grown
 from suite.discovery.library import candidates
 from suite.discovery.misfit import simulate
-from suite.discovery.terms import Term, grown
+from suite.discovery.terms import Term
 from suite.model import Initial, Input, Model, Output, Parameter
 from suite.model_file import from_toml, to_toml
 from suite.record import Record

@@ -9,13 +9,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from suite import plugins
+from suite.discovery.growing import grown
 from suite.discovery.library import candidates
-from suite.discovery.terms import Term, grown
+from suite.discovery.term_units import brought
+from suite.discovery.terms import Term
 from suite.errors import ModelError
 from suite.model import Input, Model, Output, Parameter
 from suite.model_file import from_toml, to_toml
 from suite.quantities import compact, factor, unit
-from suite.units import brought, check
+from suite.units import check
 
 OSCILLATOR = Model(
     name="oscillator",

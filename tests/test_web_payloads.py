@@ -18,7 +18,7 @@ from suite.errors import InputError
 from suite.model_file import from_toml
 from suite.readers import read_record
 from suite.record import Record, join
-from suite.web import bench_tasks, payloads, tasks
+from suite.web import bench_tasks, opened, payloads, tasks
 from suite.web.lines import line_of
 
 DECAY = """name = "decay"
@@ -189,7 +189,7 @@ def test_a_store_that_is_none_is_refused(tmp_path: Path) -> None:
 
 def test_the_record_is_read_as_the_command_reads_it(files: Any) -> None:
     """Several files are several runs."""
-    model, record = tasks.both(DECAY, files)
+    model, record = opened.both(DECAY, files)
     expected = read_record([path for path, _ in files], model)
     np.testing.assert_array_equal(record.y, expected.y)
     assert record.starts == expected.starts

@@ -11,8 +11,8 @@ from suite import plugins, units
 from suite.benchmark.cells import experiment
 from suite.case import Case, Missing, Truth
 from suite.contracts.outcome import NotApplicableError, demand
+from suite.discovery.growing import grown
 from suite.discovery.library import candidates
-from suite.discovery.terms import grown
 from suite.errors import DataError, ModelError
 from suite.model import Model, Parameter
 from suite.model_file import from_toml, to_toml

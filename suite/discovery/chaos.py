@@ -34,8 +34,9 @@ def stretches(model: Model, record: Record, path: Array) -> Record:
     starts: list[int] = []
     names: list[str] = []
     for number, (first, last) in enumerate(zip(record.bounds[:-1].tolist(), record.bounds[1:].tolist(), strict=True)):
-        growth = _growth(model, record, path, first, last)
-        cuts = [first]
+        cuts, growth = [first], _growth(model, record, path, first, last, exact=False)
+        if growth[-1] > FORGOTTEN:
+            growth = _growth(model, record, path, first, last, exact=True)
         if growth[-1] > FORGOTTEN:
             for k in range(first + 1, last - SHORTEST):
                 if growth[k - first] - growth[cuts[-1] - first] > PARTED and k - cuts[-1] >= SHORTEST:
@@ -46,8 +47,11 @@ def stretches(model: Model, record: Record, path: Array) -> Record:
     return replace(record, starts=tuple(starts), names=tuple(names)) if len(starts) > len(record.starts) else record
 
 
-def _growth(model: Model, record: Record, path: Array, first: int, last: int) -> Array:
-    """Logarithm of the factor by which neighbours part from a run's first sample on, (samples,)."""
+def _growth(model: Model, record: Record, path: Array, first: int, last: int, *, exact: bool) -> Array:
+    """Logarithm of the factor by which neighbours part from a run's first sample on, (samples,); or a bound of it.
+
+    The bound is the root of the sum of squares of all directions, which costs nothing, the factor the largest of them.
+    """
     n, program = len(model.states), model.program
     scale = np.ptp(path[first:last], axis=0)
     scale = np.where(scale > 0, scale, 1.0)
@@ -64,7 +68,7 @@ def _growth(model: Model, record: Record, path: Array, first: int, last: int) ->
             *arrays(model.values), off, none, *arrays(path[part], scale), V, np.zeros(n), np.zeros((n, n)), work,
             tangents, logs,
         )  # fmt: skip
-        sizes = np.log(np.linalg.norm(tangents[:made], 2, axis=(1, 2)))
+        sizes = np.log(np.linalg.norm(tangents[:made], 2, axis=(1, 2))) if exact else 0.0
         growth[begin + 1 - first : begin + 1 - first + made] = total + np.cumsum(logs[:made]) + sizes
         if made < end - begin:
             return growth

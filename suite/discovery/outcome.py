@@ -11,13 +11,13 @@ from suite.discovery import misfit
 from suite.discovery.engine import Problem
 from suite.discovery.fit import LEVELS, Hypothesis, Level, covariance, homotopy, summarise
 from suite.discovery.frame import Point
+from suite.discovery.growing import grown
 from suite.discovery.hold_out import Split, split
 from suite.discovery.identify import Search
 from suite.discovery.result import Coefficient, Named
-from suite.discovery.terms import grown
+from suite.discovery.term_units import brought
 from suite.discovery.whiteness import ljung_box, whiteness
 from suite.model import Model, Parameter
-from suite.units import brought
 
 Array = npt.NDArray[np.float64]
 

@@ -16,6 +16,7 @@ from suite.kernels import types as nb
 from suite.kernels.cache import compile_kernel
 from suite.kernels.factored import WIDE, factor, informed, measured
 from suite.kernels.matrix import multiply, transpose
+from suite.kernels.symmetric import symmetric
 
 # l, g, u, z (n,); L, A, B, U (n, n)
 AHEAD_WORK = nb.types.Tuple((nb.VECTOR,) * 4 + (nb.MATRIX,) * 4)
@@ -85,14 +86,11 @@ def ahead(
             # l, L through the step; A = L Phi, B = Phi'.
             multiply(L, Phi[k + 1], A)
             transpose(Phi[k + 1], B)
-            multiply(B, A, L)
+            symmetric(B, A, L)
             for i in range(n):
                 g[i] = 0.0
                 for j in range(n):
                     g[i] += B[i, j] * l[j]
-                for j in range(i):
-                    L[i, j] = 0.5 * (L[i, j] + L[j, i])
-                    L[j, i] = L[i, j]
             for i in range(n):
                 l[i] = g[i]
         if asked[k]:

@@ -17,12 +17,10 @@ from suite.kernels import types as nb
 from suite.kernels.cache import compile_kernel
 from suite.kernels.factored import FAR, WIDE, measured
 from suite.kernels.integrate import WORK
-from suite.kernels.matrix import multiply, transpose
 from suite.kernels.step import step
+from suite.kernels.symmetric import turned
 
 Array = npt.NDArray[np.float64]
-
-SMALL = 8  # states up to which products are plain sums
 
 # Hp (outputs, parameters); x, base (n,); M (n, n); yv (outputs,)
 EKF_WORK = nb.types.Tuple((nb.MATRIX, nb.VECTOR, nb.VECTOR, nb.MATRIX, nb.VECTOR))
@@ -31,34 +29,6 @@ EKF_WORK = nb.types.Tuple((nb.MATRIX, nb.VECTOR, nb.VECTOR, nb.MATRIX, nb.VECTOR
 def ekf_workspace(n: int, parameters: int, outputs: int) -> tuple[Array, ...]:
     """The scratch arrays of `ekf`."""
     return np.zeros((outputs, parameters)), np.zeros(n), np.zeros(n), np.zeros((n, n)), np.zeros(outputs)
-
-
-@compile_kernel(nb.types.void(nb.MATRIX, nb.MATRIX, nb.MATRIX, nb.MATRIX, nb.MATRIX))
-def turned(T: Any, S: Any, M: Any, W: Any, out: Any) -> None:
-    """Symmetric T S T' of a symmetric S, as T (T S)'. Writes out, which may be S, and M, W."""
-    n = T.shape[0]
-    if n <= SMALL:
-        for i in range(n):
-            for j in range(n):
-                total = 0.0
-                for l in range(n):
-                    total += T[i, l] * S[l, j]
-                M[i, j] = total
-        for i in range(n):
-            for j in range(i + 1):
-                total = 0.0
-                for l in range(n):
-                    total += M[i, l] * T[j, l]
-                out[i, j] = total
-                out[j, i] = total
-        return
-    multiply(T, S, M)
-    transpose(M, W)
-    multiply(T, W, M)
-    for i in range(n):
-        for j in range(i + 1):
-            out[i, j] = M[i, j]
-            out[j, i] = M[i, j]
 
 
 @compile_kernel(

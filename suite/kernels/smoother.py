@@ -18,16 +18,17 @@ import numpy.typing as npt
 from suite.kernels import types as nb
 from suite.kernels.cache import compile_kernel
 from suite.kernels.matrix import multiply, transpose
+from suite.kernels.symmetric import symmetric, turned
 
 Array = npt.NDArray[np.float64]
 
-# v (n,); A, B (n, n)
-SMOOTHER_WORK = nb.types.Tuple((nb.VECTOR, nb.VECTOR, nb.MATRIX, nb.MATRIX))
+# v, l0 (n,); A, B, W (n, n)
+SMOOTHER_WORK = nb.types.Tuple((nb.VECTOR, nb.VECTOR, nb.MATRIX, nb.MATRIX, nb.MATRIX))
 
 
 def adjoint_workspace(n: int) -> tuple[Array, ...]:
     """The scratch arrays of `adjoint`."""
-    return (np.zeros(n), np.zeros(n), np.zeros((n, n)), np.zeros((n, n)))
+    return (*np.zeros((2, n)), *np.zeros((3, n, n)))
 
 
 @compile_kernel(
@@ -46,7 +47,7 @@ def adjoint(
     Writes Xs, Ps smoothed, before/Before lambda and Lambda ahead of each sample's measurement, after/After behind
     it, and work.
     """
-    v, l0, A, B = work
+    v, l0, A, B, W = work
     N, n = X.shape
     for k in range(N - 1, -1, -1):
         for i in range(n):
@@ -56,14 +57,12 @@ def adjoint(
                     v[i] += Phi[k + 1, j, i] * before[k + 1, j]
             after[k, i] = v[i]
         if k < N - 1:
-            # Lambda <- Phi' (Lambda Phi)
-            multiply(Before[k + 1], Phi[k + 1], A)
             transpose(Phi[k + 1], B)
-            multiply(B, A, After[k])
+            turned(B, Before[k + 1], A, W, After[k])
         else:
             After[k] = 0.0
         multiply(After[k], P[k], A)
-        multiply(P[k], A, B)
+        symmetric(P[k], A, B)
         for i in range(n):
             Xs[k, i] = X[k, i]
             for j in range(n):

@@ -17,10 +17,11 @@ from suite.case import Case, Held
 from suite.discovery import misfit
 from suite.discovery.discrepancy import discrepancy
 from suite.discovery.fit import fit, homotopy, prepare
+from suite.discovery.growing import grown
 from suite.discovery.library import candidates
 from suite.discovery.result import Discrepancy
 from suite.discovery.state_map import bins
-from suite.discovery.terms import Term, grown
+from suite.discovery.terms import Term
 from suite.discovery.variable import samples as variable
 from suite.effect import Effect
 from suite.errors import DataError

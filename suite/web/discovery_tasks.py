@@ -22,6 +22,7 @@ from suite.model_text import to_toml
 from suite.record import Record
 from suite.report.page import write_report
 from suite.web import verdict_payload
+from suite.web.opened import both
 from suite.web.payloads import text
 from suite.web.step_payload import step as step_payload
 
@@ -39,8 +40,6 @@ class Analysis:
 
 def analyse(source: str, files: Sequence[tuple[str, str]], absolute: bool, key: str, tell: Tell) -> tuple[str, bytes]:
     """The object ANALYSIS as text, and the round pickled, which only a process of the same server reads again."""
-    from suite.web.tasks import both
-
     tell("Reading the data")
     model, record = both(source, tuple(files))
     effects = plugins.effects() | {effect.id: effect for effect in model.effects}

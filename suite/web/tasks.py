@@ -6,30 +6,26 @@ Models come as text and are read by the whitelist of the model file; data come a
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import lru_cache
-from pathlib import Path
 
 from suite.discovery import misfit
 from suite.discovery.discrepancy import discrepancy
-from suite.discovery.excerpt import excerpt
 from suite.discovery.fit import prepare
 from suite.discovery.misfit import frozen
 from suite.discovery.where import where
 from suite.errors import DataError, InputError
 from suite.model import Model, Parameter
 from suite.model_text import to_toml
-from suite.readers import read_record, read_table
-from suite.record import Record
+from suite.readers import read_table
 from suite.web import bench_tasks, discovery_tasks, example_tasks
 from suite.web.free_run import FreeRun
-from suite.web.lines import model_of
+from suite.web.opened import Files, both, known, renamed
 from suite.web.payloads import text, trace
 from suite.web.step_payload import step
 
 Tell = Callable[[str], None]
-Files = Sequence[tuple[str, str]]  # (path, shown name)
 
 CHEAP = 3000  # samples up to which a comparison also smooths the model error
 
@@ -122,36 +118,6 @@ def changed(found: Model, values: Mapping[str, float]) -> Model:
     return found.with_values(values)
 
 
-@lru_cache(maxsize=16)
-def known(source: str) -> Model:
-    """The model in a text; that of the last ones is kept."""
-    return model_of(source)
-
-
-@lru_cache(maxsize=4)
-def both(source: str, files: tuple[tuple[str, str], ...]) -> tuple[Model, Record]:
-    """The model and its record, of a very long one an excerpt."""
-    found = known(source)
-    if not files:
-        raise DataError("no data; open a file of measurements")
-    if not found.outputs:
-        raise InputError("the model has no outputs; add a table [outputs] that says what was measured")
-    try:
-        record = read_record([path for path, _ in files], found)
-    except DataError as error:
-        raise renamed(error, files) from None
-    names = tuple(name for _, name in files)
-    return found, excerpt(found, replace(record, names=names, source=", ".join(dict.fromkeys(names))))
-
-
 @lru_cache(maxsize=4)
 def _free_run(source: str, files: tuple[tuple[str, str], ...]) -> FreeRun:
     return FreeRun(*both(source, files))
-
-
-def renamed(error: DataError, files: Files) -> DataError:
-    """The error with the names that the person knows the files by."""
-    sentence = str(error)
-    for path, name in files:
-        sentence = sentence.replace(path, name).replace(Path(path).name, name)
-    return DataError(sentence)
