@@ -20,15 +20,14 @@ LOST = 1e-6  # what is left of a variance where P - P Lambda P has lost its digi
 
 @dataclass(frozen=True)
 class Smoothed:
-    """A smoothed run: x (N, n), P (N, n, n); w (N, n) the process noise of the step that ends at a sample, P_w its
-    covariance (zero at the first sample); before, after (N, n) the adjoint ahead of and behind each measurement, with
+    """A smoothed run: x (N, n), P (N, n, n); before, after (N, n) the adjoint ahead of and behind each measurement,
     Before (N, n, n) the information ahead of it.
+
+    The process noise of the step that ends at a sample is Qd before, its covariance Qd - Qd Before Qd.
     """
 
     x: Array
     P: Array
-    w: Array
-    P_w: Array
     before: Array
     Before: Array
     after: Array
@@ -50,9 +49,7 @@ def smoothed(run: Filtered) -> Smoothed:
             run.Phi, run.Qd, run.H, run.K, run.innovation, run.seen, *arrays(run.R), run.x, run.x_prior, run.P, asked,
             room, Xs, Ps, before, Before, after,
         )  # fmt: skip
-    w = np.einsum("kij,kj->ki", run.Qd, before)
-    P_w = run.Qd - run.Qd @ Before @ run.Qd
-    return Smoothed(Xs, 0.5 * (Ps + Ps.transpose(0, 2, 1)), w, P_w, before, Before, after)
+    return Smoothed(Xs, Ps, before, Before, after)
 
 
 def _lost(run: Filtered, Ps: Array) -> npt.NDArray[np.bool_]:

@@ -74,10 +74,12 @@ def test_the_smoothed_noise_closes_the_dynamics() -> None:
     _, C, _ = dense(record, PRIOR.x0, PRIOR.P0, PRIOR.Q, PRIOR.R)
     for k in range(1, len(record)):
         moved, Phi = OSCILLATOR.transition(record.t[k - 1], result.x[k - 1], (), record.t[k] - record.t[k - 1])
-        np.testing.assert_allclose(result.w[k], result.x[k] - moved, rtol=0.0, atol=1e-10)
+        np.testing.assert_allclose(run.Qd[k] @ result.before[k], result.x[k] - moved, rtol=0.0, atol=1e-10)
         L = np.hstack([-Phi, np.eye(2)])
         joint = C[k - 1 : k + 1][:, :, k - 1 : k + 1].reshape(4, 4)
-        np.testing.assert_allclose(result.P_w[k], L @ joint @ L.T, rtol=0.0, atol=1e-9)
+        np.testing.assert_allclose(
+            run.Qd[k] - run.Qd[k] @ result.Before[k] @ run.Qd[k], L @ joint @ L.T, rtol=0.0, atol=1e-9
+        )
 
 
 def test_batch_is_the_rts_smoother() -> None:

@@ -81,8 +81,11 @@ def test_a_covariance_is_one_however_wide_the_prior(
         spread = np.sqrt(np.diagonal(other.P, axis1=1, axis2=2))
         np.testing.assert_allclose((both.x - other.x) / spread, 0.0, atol=0.01)
         np.testing.assert_allclose(both.P / (spread[:, :, None] * spread[:, None, :]), correlation(other.P), atol=1e-3)
-        np.testing.assert_allclose(both.w, other.w, rtol=1e-3, atol=1e-4 * np.abs(other.w).max())
-        np.testing.assert_allclose(both.P_w, other.P_w, rtol=1e-3, atol=1e-4 * np.abs(other.P_w).max())
+        # The noise of the steps and its covariance, both from the adjoint.
+        jumps = [np.einsum("kij,kj->ki", run.Qd, result.before) for result in (both, other)]
+        np.testing.assert_allclose(*jumps, rtol=1e-3, atol=1e-4 * np.abs(jumps[1]).max())
+        known = [run.Qd @ result.Before @ run.Qd for result in (both, other)]
+        np.testing.assert_allclose(*known, rtol=1e-3, atol=1e-4 * run.Qd.max())
     # What the whole record says is not less than what its past says, but for the digits that a double has.
     assert (np.diagonal(both.P, axis1=1, axis2=2) <= np.diagonal(run.P, axis1=1, axis2=2) * (1 + 1e-6)).all()
 
