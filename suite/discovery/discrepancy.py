@@ -22,6 +22,7 @@ Grid = tuple[float, ...]
 
 MANY = 4  # suspected equations above which no smooth process is tried: each slope is one state more
 LONG = 10_000  # samples on which the numbers of the processes are chosen
+LARGE = 40  # states, with those of d, from which fewer samples and processes do: a pass grows with their square
 UNLIKELY = 5.0  # of the log-likelihood: what is this far behind the likeliest counts no more
 STEP = 0.5  # decades between the numbers that are tried
 
@@ -126,7 +127,7 @@ def _likely(
     """The processes near the likeliest, with their log-likelihoods: from the best of `starts` uphill on the grid, and
     all its neighbours; none where every filter left the finite numbers.
     """
-    share = min(1.0, LONG / len(problem.record))
+    share = min(1.0, LONG / len(problem.record) * min(1.0, (LARGE / len(process(starts[0]).model.states)) ** 2))
     parts = [run.part(0, max(int(share * len(run)), min(len(run), 20))) for run in problem.record.runs]
     tried: dict[Grid, float] = {}
 
@@ -151,9 +152,14 @@ def _likely(
 
 
 def _average(problem: Problem, point: Point, R: Array, n: int, tried: Sequence[tuple[float, Process]]) -> Smooth:
-    """The mean over processes weighted by likelihood; the variance holds each one's own and their spread."""
-    best = max(value for value, _ in tried)
+    """The mean over processes weighted by likelihood; the variance holds each one's own and their spread.
+
+    Of a large model it is the likeliest process alone.
+    """
+    best, first = max(tried, key=lambda entry: entry[0])
     likely = [(np.exp(value - best), process) for value, process in tried if value > best - UNLIKELY]
+    if len(first.model.states) > LARGE:
+        likely = [(1.0, first)]
     total = sum(weight for weight, _ in likely)
     count = len(problem.model.suspects)
     x, d, square = 0.0, 0.0, 0.0
