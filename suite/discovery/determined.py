@@ -15,6 +15,7 @@ from suite.discovery.frame import Layout
 Array = npt.NDArray[np.float64]
 
 NULL = 1e-6  # of the largest singular value of the scaled sensitivities: below it a direction does not act
+SAID = 2  # combinations that are named in sentences; the JSON holds all
 VAGUE = 0.5  # of its value: the standard deviation from which a parameter is hardly known
 
 
@@ -73,7 +74,9 @@ def findings(problem: Problem, level: Level, layout: Layout) -> list[str]:
     """The same in sentences, with the mend."""
     found = directions(problem, level, layout)
     said = [f"Only a combination of {', '.join(members)} acts on the data; fix all but one of them."
-            for members in found.mixed]  # fmt: skip
+            for members in found.mixed[:SAID]]  # fmt: skip
+    if len(found.mixed) > SAID:
+        said.append(f"So it is with {len(found.mixed) - SAID} more combinations of parameters and first states.")
     said += [f"{name} has no effect on what is measured; fix it or measure more." for name in found.dead]
     mixed = {name for members in found.mixed for name in members}
     if not level.passed.finite:

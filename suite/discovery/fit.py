@@ -18,7 +18,7 @@ from suite.discovery.chaos import stretches
 from suite.discovery.engine import Pass, Problem
 from suite.discovery.frame import Index, Layout, Point
 from suite.discovery.noise import noise_variance, without_outliers
-from suite.discovery.starts import brought, check_record, first_states, pace_of, rough_path, start_of
+from suite.discovery.starts import brought, check_record, check_stiffness, first_states, pace_of, rough_path, start_of
 from suite.discovery.terms import Term
 from suite.model import Model
 from suite.record import Record
@@ -205,6 +205,8 @@ def prepare(model: Model, record: Record, terms: tuple[Term, ...] = ()) -> Probl
         if level.passed.finite:
             path = level.passed.X
             x0 = level.point.x0
+        else:
+            check_stiffness(model, record, problem.start.x0)
     cut = stretches(model, acting(record, model), path)
     if len(cut.starts) > len(record.starts):
         record = replace(record, starts=cut.starts, names=cut.names)

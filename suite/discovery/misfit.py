@@ -82,6 +82,7 @@ def compare(
     worst = _worst(record, residual(model, record, Y, sigma))
     worst_of_all = _worst_pieces(judged, over_all) if whole and over_all is not None else worst
     words = [f"{fit[name]:.3g} % of {name} (error {error[name]:.3g}, noise {sigma[j]:.2g})"
+             if np.isfinite(error[name]) else f"nothing of {name}, for its free run leaves the finite numbers"
              for j, name in enumerate(names)]  # fmt: skip
     if worst_of_all:
         run, first, last = worst_of_all[0]

@@ -16,11 +16,14 @@ from suite.discovery.engine import Problem
 from suite.discovery.frame import Point
 from suite.discovery.noise import unrolled
 from suite.discovery.terms import Term
-from suite.errors import DataError
+from suite.errors import DataError, ModelError
+from suite.kernels.integrate import FINEST
 from suite.model import Model
 from suite.record import Record
 
 Array = npt.NDArray[np.float64]
+
+FASTEST = 2.7 * FINEST  # rate times step at which the finest parts of a step still keep a decaying state bounded (RK4)
 
 
 def check_record(model: Model, record: Record) -> None:
@@ -39,6 +42,26 @@ def check_record(model: Model, record: Record) -> None:
             f"{record.source}: {count} measurements cannot determine {unknown} parameters and {first} initial states; "
             "add data or fix parameters"
         )
+
+
+def check_stiffness(model: Model, record: Record, x0: Array) -> None:
+    """Raise ModelError where a state is too fast for the record's steps, at the first states x0 (runs, n).
+
+    For a simulation that left the finite numbers: a fast state that decays is then an explosion of the integration.
+    """
+    dt = float(np.median(record.dt))
+    for first, x in zip(record.starts, x0, strict=True):
+        F = model.jacobian(float(record.t[first]), x, record.u[first])
+        with np.errstate(all="ignore"):
+            rates = np.abs(np.diag(F)) + np.sqrt(np.abs(F * F.T - np.diag(np.diag(F) ** 2))).sum(axis=1)
+        fastest = int(np.argmax(np.nan_to_num(rates)))
+        if rates[fastest] * dt > FASTEST:
+            name = list(model.states)[fastest]
+            raise ModelError(
+                f"{model.source}, [states] {name}: too fast for these data; its rate is {rates[fastest]:.3g} a unit of "
+                f"time and a step of the data {dt:.3g}, expected at most {FASTEST / dt:.3g}; put the value at which it "
+                "settles into the other equations in its place, or give data at finer steps"
+            )
 
 
 def first_states(model: Model, record: Record) -> tuple[Array, npt.NDArray[np.bool_]]:
