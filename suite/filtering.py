@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from suite.kernels.factored import FAR
 from suite.kernels.integrate import workspace
 from suite.kernels.jumps import jump_workspace, rates_from_jumps
 from suite.kernels.kalman import ekf, ekf_workspace
@@ -25,8 +24,7 @@ class Filtered:
     x, x_prior (N, n); P, P_prior (N, n, n); Phi, Qd (N, n, n): transition and process noise of the step that ends at
     a sample; H, K (N, m, n); innovation, variance (N, m): of the channels one after another, 0 and 1 where missing;
     seen (N, m): what was measured; R (m,): the sensors' variances;
-    failed_at: None, or the sample at which a number was no longer finite, or a forecast so uncertain that a double
-    cannot hold its variance beside the sensor's (later entries then mean nothing).
+    failed_at: None, or the sample at which a number was no longer finite (later entries then mean nothing).
     """
 
     x: Array
@@ -51,14 +49,7 @@ class Filtered:
     def failure(self, t: Array) -> str:
         """What went wrong at `failed_at`, of times t (N,)."""
         assert self.failed_at is not None
-        with np.errstate(invalid="ignore"):
-            far = (self.variance[self.failed_at] > FAR * self.R).any()
-        when = f"t = {t[self.failed_at]:.4g} s; its last estimate is held from there"
-        if far:
-            return (
-                f"a forecast is more than {FAR:.0e} times as uncertain as its sensor, too wide for a filter, at {when}"
-            )
-        return f"the filter diverged at {when}"
+        return f"the filter diverged at t = {t[self.failed_at]:.4g} s; its last estimate is held from there"
 
 
 def filtered(

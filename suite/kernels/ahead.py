@@ -37,7 +37,7 @@ def blurred(L: Any, l: Any, u: Any, q: float, g: Any, W: Any) -> None:
         along += u[i] * l[i]
     wide = s * q > WIDE or s * q < 1.0
     if wide:
-        s = measured(L, u, 1.0 / q, W, g)
+        s = measured(L, u, 1.0 / q, 0.0, W, g)
     for i in range(n):
         l[i] -= g[i] * along / s
         if not wide:
@@ -72,7 +72,7 @@ def ahead(
             for i in range(n):
                 for j in range(n):
                     l[i] += L[i, j] * (X[k + 1, j] - Xp[k + 1, j])
-            factor(Qd[k + 1], U)
+            factor(Qd[k + 1], U, 0.0)
             for j in range(n):
                 if U[j, j] > 0.0:
                     for i in range(n):

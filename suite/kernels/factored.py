@@ -13,18 +13,23 @@ from suite.kernels import types as nb
 from suite.kernels.cache import compile_kernel
 
 WIDE = 1e8  # an innovation's variance over its sensor's, from which on half of the digits are lost
-FAR = 1e14  # the same, from which on the state beside it cannot be told
+ROUNDING = 1e-15  # of a variance, a state: what the products that a forecast is made of may be off
 
 
-@compile_kernel(nb.types.void(nb.MATRIX, nb.MATRIX))
-def factor(P: Any, U: Any) -> None:
-    """Write U with D in place of its diagonal of ones; a pivot below zero by rounding is zero."""
+@compile_kernel(nb.types.void(nb.MATRIX, nb.MATRIX, nb.REAL))
+def factor(P: Any, U: Any, least: float) -> None:
+    """Write U with D in place of its diagonal of ones, each at least `least` of the variance and never below zero.
+
+    What a narrow direction of a wide P was is lost in rounding. With `least` at n ROUNDING it counts as unknown to that
+    extent, and what was known there is forgotten; with 0 it may count as known.
+    """
     n = P.shape[0]
     for j in range(n - 1, -1, -1):
         pivot = P[j, j]
         for l in range(j + 1, n):
             pivot -= U[l, l] * U[j, l] * U[j, l]
-        U[j, j] = max(pivot, 0.0)
+        pivot = max(pivot, least * P[j, j], 0.0)
+        U[j, j] = pivot
         for i in range(j):
             total = P[i, j]
             for l in range(j + 1, n):
@@ -47,15 +52,15 @@ def product(U: Any, P: Any) -> None:
             P[j, i] = total
 
 
-@compile_kernel(nb.REAL(nb.MATRIX, nb.VECTOR, nb.REAL, nb.MATRIX, nb.VECTOR))
-def measured(P: Any, h: Any, R: float, U: Any, gain: Any) -> float:
+@compile_kernel(nb.REAL(nb.MATRIX, nb.VECTOR, nb.REAL, nb.REAL, nb.MATRIX, nb.VECTOR))
+def measured(P: Any, h: Any, R: float, least: float, U: Any, gain: Any) -> float:
     """P <- P - K s K' of one channel, gain <- P h' = K s; returns s = h P h' + R. Bierman (1977), V.3. Writes U.
 
     U goes through column by column: D_j shrinks by alpha_(j-1) / alpha_j, alpha_j the variance of what the first j
     factors bring and of the sensor.
     """
     n = P.shape[0]
-    factor(P, U)
+    factor(P, U, least)
     alpha = R
     for j in range(n):
         f = h[j]
@@ -64,7 +69,7 @@ def measured(P: Any, h: Any, R: float, U: Any, gain: Any) -> float:
         v = U[j, j] * f
         before = alpha
         alpha += v * f
-        if before > 0.0:
+        if alpha > 0.0:
             U[j, j] *= before / alpha
         gain[j] = v
         for i in range(j):
@@ -80,7 +85,7 @@ def measured(P: Any, h: Any, R: float, U: Any, gain: Any) -> float:
 def informed(P: Any, L: Any, U: Any, M: Any, out: Any) -> None:
     """(P^-1 + L)^-1 = S (I + S' L S)^-1 S' of P = S S' >= 0 and an information L >= 0, symmetric. Writes U, M, out."""
     n = P.shape[0]
-    factor(P, U)
+    factor(P, U, n * ROUNDING)
     for j in range(n):
         root = math.sqrt(U[j, j])
         for i in range(j):

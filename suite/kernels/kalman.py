@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from suite.kernels import types as nb
 from suite.kernels.cache import compile_kernel
-from suite.kernels.factored import FAR, WIDE, measured
+from suite.kernels.factored import ROUNDING, WIDE, measured
 from suite.kernels.integrate import WORK
 from suite.kernels.step import step
 from suite.kernels.symmetric import turned
@@ -43,7 +43,7 @@ def ekf(
     x0: Any, P0: Any, p: Any, on: Any, Q: Any, spread: int, R: Any, angle: Any, none: Any, work: Any, ekf_work: Any,
     X: Any, P: Any, Xp: Any, Pp: Any, Phi: Any, Qd: Any, H: Any, K: Any, nu: Any, s: Any,
 ) -> int:  # fmt: skip
-    """Run over one run; returns -1, or the first sample at which a number is no longer finite, or too large to tell.
+    """Run over one run; returns -1, or the first sample at which a number is no longer finite.
 
     own: the model's own step (see `step`) or 0; t (N,), u (N, inputs), y (N, outputs; NaN is missing), nominal,
     departure (N, n): where to linearise the output at a sample and the step from it if `around`, else at the filter's
@@ -93,7 +93,6 @@ def ekf(
                 C[i, j] = Pp[k, i, j]
             base[i] = nominal[k, i] if around != 0 else x[i]
         output(t[k], base, u[k], p, on, yv, H[k], Hp)
-        sound = True
         for c in range(ny):
             nu[k, c] = 0.0
             s[k, c] = 1.0
@@ -118,8 +117,7 @@ def ekf(
                 variance += h[i] * gain[i]
             wide = variance > WIDE * R[c] or variance < R[c]
             if wide:
-                variance = measured(C, h, R[c], M, gain)
-                sound = sound and variance <= FAR * R[c]
+                variance = measured(C, h, R[c], n * ROUNDING, M, gain)
             nu[k, c] = e
             s[k, c] = variance
             for i in range(n):
@@ -130,6 +128,7 @@ def ekf(
             for i in range(n):
                 for j in range(n):
                     C[i, j] -= gain[i] * gain[j] * variance
+        sound = True
         for i in range(n):
             X[k, i] = x[i]
             sound = sound and math.isfinite(x[i])

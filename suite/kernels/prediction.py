@@ -12,7 +12,7 @@ from typing import Any
 
 from suite.kernels import types as nb
 from suite.kernels.cache import compile_kernel
-from suite.kernels.factored import WIDE, measured
+from suite.kernels.factored import ROUNDING, WIDE, measured
 from suite.kernels.integrate import WORK
 from suite.kernels.step import step as move
 
@@ -140,7 +140,7 @@ def prediction_errors(
                         variance += Hx[c, i] * K[i]
                 wide = noisy and (variance > WIDE * R[c] or variance < R[c])
                 if wide:
-                    variance = measured(P, Hx[c], R[c], P2, K)
+                    variance = measured(P, Hx[c], R[c], n * ROUNDING, P2, K)
                 root = math.sqrt(variance)
                 e[step, c] = nu / root
                 s[step, c] = variance
