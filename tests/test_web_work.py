@@ -190,7 +190,7 @@ def test_two_tabs_work_at_the_same_time(client: Any, loaded: dict[str, Any]) -> 
         began = 0.0
         with client.stream("POST", "/api/analyse", json=loaded) as answer:
             for line in answer.iter_lines():
-                began = began or (time.monotonic() if "Trying" in line else 0.0)
+                began = began or (time.monotonic() if "Reading" in line else 0.0)
         spans.append((began, time.monotonic()))
 
     tabs = [threading.Thread(target=tab) for _ in range(2)]

@@ -205,14 +205,13 @@ def prepare(model: Model, record: Record, terms: tuple[Term, ...] = ()) -> Probl
         if level.passed.finite:
             path = level.passed.X
             x0 = level.point.x0
-        else:
-            check_stiffness(model, record, problem.start.x0)
     cut = stretches(model, acting(record, model), path)
     if len(cut.starts) > len(record.starts):
         record = replace(record, starts=cut.starts, names=cut.names)
         x0, free = path[list(cut.starts)].copy(), np.ones_like(free)
         problem = replace(problem, record=record, free_x0=free)
     problem = replace(problem, path=path, weights=pace_of(model, record, path), start=Point(x0, model.values))
+    check_stiffness(problem)
     full = replace(problem, substeps=substeps(problem, problem.start), terms=terms)
     p = np.concatenate([model.values, *(start_of(full, term) for term in terms)])
     start = Point(np.hstack([x0, np.zeros((len(x0), sum(len(term.states) for term in terms)))]), p)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 
@@ -158,13 +159,20 @@ def weight(value: float) -> str:
 
 def _falls(verdict: Verdict) -> str:
     after, before, noise = verdict.error["after"], verdict.error["before"], verdict.error["noise"]
-    parts = [f"{name} falls from {before[name]:.3g} to {after[name]:.3g} (noise {noise[name]:.2g})" for name in after]
+    parts = [
+        f"{name} falls from {number(before[name])} to {number(after[name])} (noise {noise[name]:.2g})" for name in after
+    ]
     return "the error of " + ", of ".join(parts)
 
 
 def numbers(values: dict[str, float]) -> str:
     """Values by name, in a row."""
-    return ", ".join(f"{value:.3g} ({name})" for name, value in values.items())
+    return ", ".join(f"{number(value)} ({name})" for name, value in values.items())
+
+
+def number(value: float) -> str:
+    """An error; of a simulation that left the finite numbers in a word."""
+    return f"{value:.3g}" if math.isfinite(value) else "infinite"
 
 
 def _moved(verdict: Verdict) -> str:

@@ -56,23 +56,28 @@ def solve(A: Any, B: Any) -> int:
     return 1
 
 
+@compile_kernel(nb.types.void(nb.VECTOR, nb.MATRIX, nb.INT, nb.VECTOR))
+def combined(a: Any, B: Any, width: int, c: Any) -> None:
+    """c = a B in its first `width` numbers, four rows of B at a time: the inner loop runs along memory. Writes c."""
+    inner = B.shape[0]
+    whole = inner - inner % 4
+    for j in range(width):
+        c[j] = 0.0
+    for l in range(0, whole, 4):
+        a0, a1, a2, a3 = a[l], a[l + 1], a[l + 2], a[l + 3]
+        if a0 != 0.0 or a1 != 0.0 or a2 != 0.0 or a3 != 0.0:
+            for j in range(width):
+                c[j] += a0 * B[l, j] + a1 * B[l + 1, j] + a2 * B[l + 2, j] + a3 * B[l + 3, j]
+    for l in range(whole, inner):
+        for j in range(width):
+            c[j] += a[l] * B[l, j]
+
+
 @compile_kernel(nb.types.void(nb.MATRIX, nb.MATRIX, nb.MATRIX))
 def multiply(A: Any, B: Any, C: Any) -> None:
-    """C = A B, four rows of B at a time: the inner loop runs along memory. Writes C, which is neither A nor B."""
-    inner = B.shape[0]
-    width = B.shape[1]
-    whole = inner - inner % 4
+    """C = A B. Writes C, which is neither A nor B."""
     for i in range(A.shape[0]):
-        for j in range(width):
-            C[i, j] = 0.0
-        for l in range(0, whole, 4):
-            a0, a1, a2, a3 = A[i, l], A[i, l + 1], A[i, l + 2], A[i, l + 3]
-            if a0 != 0.0 or a1 != 0.0 or a2 != 0.0 or a3 != 0.0:
-                for j in range(width):
-                    C[i, j] += a0 * B[l, j] + a1 * B[l + 1, j] + a2 * B[l + 2, j] + a3 * B[l + 3, j]
-        for l in range(whole, inner):
-            for j in range(width):
-                C[i, j] += A[i, l] * B[l, j]
+        combined(A[i], B, B.shape[1], C[i])
 
 
 @compile_kernel(nb.types.void(nb.MATRIX, nb.MATRIX))
