@@ -16,6 +16,7 @@ from suite.kernels.types import arrays
 Array = npt.NDArray[np.float64]
 
 LOST = 1e-6  # what is left of a variance where P - P Lambda P has lost its digits
+FAR = 1e14  # a forecast's variance over its sensor's where the means have lost theirs
 
 
 @dataclass(frozen=True)
@@ -45,20 +46,35 @@ def smoothed(run: Filtered) -> Smoothed:
     asked = _lost(run, Ps)
     if asked.any():
         room = (*np.zeros((4, n)), *np.zeros((4, n, n)))
+        x, l, m = Xs.copy(), before.copy(), after.copy()
+        L = Before.copy()
         ahead(
             run.Phi, run.Qd, run.H, run.K, run.innovation, run.seen, *arrays(run.R), run.x, run.x_prior, run.P, asked,
-            room, Xs, Ps, before, Before, after,
+            room, x, Ps, l, L, m,
         )  # fmt: skip
+        # The adjoint keeps the means to a hundredth of their deviations up to here, and the better the wider the noise.
+        far = _last(run, FAR)
+        Xs[:far], after[:far], before[: far + 1], Before[: far + 1] = x[:far], m[:far], l[: far + 1], L[: far + 1]
     return Smoothed(Xs, Ps, before, Before, after)
 
 
+def _last(run: Filtered, ratio: float) -> int:
+    """How many samples there are up to the last one whose forecast was so many times as uncertain as is usual.
+
+    Where the noise of the steps makes every forecast wide, none of them is: what comes after says little of a state.
+    """
+    channels = zip(run.variance.T, run.seen.T, strict=True)
+    usual = np.array([np.median(variance[seen]) if seen.any() else np.inf for variance, seen in channels])
+    rows = np.flatnonzero((run.seen & (run.variance > ratio * usual)).any(axis=1))
+    return int(rows.max(initial=-1)) + 1
+
+
 def _lost(run: Filtered, Ps: Array) -> npt.NDArray[np.bool_]:
-    """The samples (N,) of which the adjoint cannot be trusted, whose P - P Lambda P is Ps (N, n, n).
+    """The samples (N,) of which P - P Lambda P, Ps (N, n, n), cannot be trusted.
 
     Those up to the last one at which the state was unknown beside the sensor, and those whose difference is too small.
     """
-    wide = np.flatnonzero((run.seen & (run.variance > WIDE * run.R)).any(axis=1))
     variances, left = (np.diagonal(matrices, axis1=1, axis2=2) for matrices in (run.P, Ps))
     lost = np.array(((left < LOST * variances) | (left > (1.0 + LOST) * variances)).any(axis=1))
-    lost[: wide.max(initial=-1) + 1] = True
+    lost[: _last(run, WIDE)] = True
     return lost

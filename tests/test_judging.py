@@ -291,3 +291,17 @@ def test_figures_come_from_stored_rows(tmp_path: Path) -> None:
     paths = bench_figures.draw(rows, tmp_path)
     assert {path.suffix for path in paths} == {".svg", ".png"}
     assert all(path.stat().st_size > 1000 for path in paths)
+
+
+def test_nees_does_not_depend_on_units_and_is_no_difference_of_large_numbers() -> None:
+    """States in millimetres and megagrams, a covariance that is singular but for its rounding: the same, not < 0."""
+    rng = np.random.default_rng(3)
+    a = rng.standard_normal((50, 3, 2))
+    P = a @ a.transpose(0, 2, 1)  # two directions are known to nothing, the third exactly
+    error = np.einsum("kij,kj->ki", a, rng.standard_normal((50, 2)))
+    found = metrics.nees(error, P)
+    assert found == pytest.approx(2.0 / 3.0, rel=0.2)
+    units = np.array([1e3, 1e-6, 1.0])
+    assert metrics.nees(error * units, P * units[:, None] * units) == pytest.approx(found, rel=1e-6)
+    rough = P * (1.0 + 1e-13 * rng.standard_normal(P.shape))
+    assert metrics.nees(error, 0.5 * (rough + rough.transpose(0, 2, 1))) == pytest.approx(found, rel=1e-6)

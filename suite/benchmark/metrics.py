@@ -26,8 +26,9 @@ SHAPES: dict[str, Callable[[Array], Array]] = {
     "sign({})": np.sign,
 }
 
-# An eigenvalue of a covariance below this share of the largest one is rounding.
-EXACT = 1e-15
+# An eigenvalue of a correlation below this share of the largest one is rounding: a smoother's P - P Lambda P may have
+# lost six digits of it.
+EXACT = 1e-9
 
 
 def judge(
@@ -147,12 +148,15 @@ def _cosines(model: Model, x: Array, d: Array) -> dict[str, float]:
 def nees(error: Array, P: Array) -> float:
     """Mean over time of e' P^-1 e / n: 1 where the covariance is right, above where it is too small (Bar-Shalom).
 
-    Directions in which P says "known exactly" are left out of the inverse.
+    Directions in which P says "known exactly" are left out of the inverse; which these are does not depend on units.
     """
-    size, axes = np.linalg.eigh(P)
-    along_axes = np.einsum("kji,kj->ki", axes, error)
+    variances = np.diagonal(P, axis1=1, axis2=2)
+    sd = np.sqrt(np.maximum(variances, 0.0))
+    known = np.where(sd > 0.0, sd, 1.0)
+    size, axes = np.linalg.eigh(np.where((sd > 0.0)[:, :, None], P / (known[:, :, None] * known[:, None, :]), 0.0))
+    along_axes = np.einsum("kji,kj->ki", axes, error / known)
     # The pseudo-inverse: what is rounding beside the largest eigenvalue counts as zero.
-    unsure = np.abs(size) > EXACT * np.abs(size).max(axis=1, keepdims=True)
+    unsure = size > EXACT * size.max(axis=1, keepdims=True)
     total = np.sum(np.where(unsure, along_axes**2 / np.where(unsure, size, 1.0), 0.0), axis=1)
     return float(np.mean(total) / error.shape[1])
 
