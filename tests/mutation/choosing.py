@@ -20,7 +20,10 @@ class Choice:
     def __init__(self, coverage: Path, durations: Path, root: Path) -> None:
         self.root, self.data = root, CoverageData(str(coverage))
         self.data.read()
-        self.files = {_inside(name): name for name in self.data.measured_files()}
+        # A file was measured under several names where tests made copies of the project.
+        self.files: dict[str, list[str]] = {}
+        for name in self.data.measured_files():
+            self.files.setdefault(_inside(name), []).append(name)
         self.callers: dict[str, set[str]] = {}
         self.seconds = {
             f"{case.get('file')}::{case.get('name')}": float(case.get("time", 0.0))
@@ -44,12 +47,11 @@ class Choice:
         return chosen
 
     def _contexts(self, path: str, lines: set[int] | None) -> set[str]:
-        name = self.files.get(path)
-        if name is None:
-            return set()
-        by_line = self.data.contexts_by_lineno(name)
-        asked = by_line if lines is None else lines & set(by_line)
-        tests = {context.partition("|")[0] for line in asked for context in by_line[line]}
+        tests = set[str]()
+        for name in self.files.get(path, ()):
+            by_line = self.data.contexts_by_lineno(name)
+            asked = by_line if lines is None else lines & set(by_line)
+            tests |= {context.partition("|")[0] for line in asked for context in by_line[line]}
         return {test for test in tests if test in self.seconds and not any(name in test for name in NOT_ASKED)}
 
     def _callers(self, path: str) -> set[str]:
