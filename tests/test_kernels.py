@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,8 @@ from scipy.integrate import solve_ivp
 
 from suite.kernels.integrate import advance, workspace
 from suite.kernels.prediction import prediction_errors
-from suite.model import Input, Model, Output, Parameter
+from suite.kernels.step import step
+from suite.model import Initial, Input, Model, Output, Parameter
 
 Array = npt.NDArray[np.float64]
 
@@ -69,6 +71,23 @@ def test_the_tangent_is_the_difference_quotient_of_the_step() -> None:
         e = np.eye(4)[j] * step
         ends = [_move(DUFFING, x0, p + s * e, 0.2, (1.0, 2.5), 3)[0] for s in (1, -1)]
         np.testing.assert_allclose(T[:, 2 + j], (ends[0] - ends[1]) / (2 * step), rtol=1e-7, atol=1e-8)
+
+
+def test_the_address_that_is_given_is_what_moves_the_state() -> None:
+    """`step` calls the step of the address where there is one, and the rates it is given where there is none."""
+    grows = Model("grows", {"x": "k*x"}, {"k": Parameter(1.0)}, initial={"x": Initial(1.0)})
+    decays = replace(grows, name="decays", states={"x": "-k*x"})
+    off, none = grows.program.all_off(), np.zeros(0, dtype=np.int64)
+    ends = []
+    for own in (decays.program.step_when(off), 0):
+        x, T = np.ones(1), np.zeros((1, 1))
+        step(
+            own, grows.program.rate, 0.0, 0.1, none.astype(float), none.astype(float), grows.linear_inputs,
+            grows.values, off, none, 1, x, T, workspace(1, 0, 1, 0),
+        )  # fmt: skip
+        assert T[0, 0] == pytest.approx(x[0])
+        ends.append(x[0])
+    assert ends == pytest.approx([np.exp(-0.1), np.exp(0.1)], rel=1e-6)
 
 
 @settings(max_examples=30, deadline=None)

@@ -9,10 +9,12 @@ import pytest
 
 from suite import plugins
 from suite.case import Case
-from suite.discovery import long
+from suite.discovery import chaos, long
 from suite.discovery import verdict as verdicts
 from suite.discovery.fit import prepare
 from suite.discovery.verdict import diagnose, investigate, judge
+from suite.model import Model, Output
+from suite.record import Record
 
 EFFECTS = plugins.effects()
 
@@ -34,6 +36,17 @@ def test_a_long_record_of_a_hardening_spring_is_diagnosed() -> None:
     a = verdict.effects[0].coefficients["a"]
     assert abs(a.value - 0.3) < 3.0 * a.sd < 0.03 * 0.3
     assert 0.98 < verdict.error["after"]["pos"] / truth.noise[0] < 1.02
+
+
+def test_neighbours_of_a_plant_that_ignores_its_states_do_not_part() -> None:
+    """The tangent is the identity: factor one from start to end, and the bound of it the root of the state count."""
+    model = Model("moved by the clock alone", {"x": "cos(t)", "y": "-sin(t)"}, outputs={"x": Output("x", column="x")})
+    t = np.linspace(0.0, 3.0, 31)
+    record = Record(t, np.zeros((31, 0)), np.sin(t)[:, None])
+    path = np.column_stack([np.sin(t), np.cos(t)])
+    assert chaos._growth(model, record, path, 0, 31, exact=True) == pytest.approx(np.zeros(31), abs=1e-12)
+    bound = chaos._growth(model, record, path, 0, 31, exact=False)
+    assert bound[1:] == pytest.approx(np.full(30, 0.5 * np.log(2.0)), abs=1e-12)
 
 
 def test_a_complete_chaotic_model_is_adequate_in_stretches() -> None:

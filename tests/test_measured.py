@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,11 +13,12 @@ import pytest
 
 from suite import plugins
 from suite.benchmark import held_out
-from suite.case import Case, Held
+from suite.case import Case, Experiment, Held
 from suite.discovery.fit import fit
 from suite.errors import DataError, InputError
 from suite.model import Initial, Model, Output, Parameter
 from suite.record import Record
+from suite.report import gallery
 
 CASES = [name for name, case in plugins.cases().items() if case.measured is not None]
 POSITIVE = (0.0, np.inf)
@@ -158,3 +160,52 @@ def test_a_case_without_its_data_is_a_row_with_the_reason(tmp_path: Path) -> Non
         text = (tmp_path / "out" / name).read_text(encoding="utf-8")
         assert "nonlinearbenchmark.org" in text
         assert "sha256" in text
+
+
+def test_a_case_is_judged_on_the_part_that_discovery_never_saw(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A row has the errors of the refitted and of the amended model, what was named, and whether the target is met."""
+    spring = Model(
+        "spring",
+        {"p": "v", "v": "2.5*cos(t) - c*v - k*p"},
+        {"c": Parameter(0.68, sd=0.05), "k": Parameter(1.0, sd=0.05)},
+        outputs={"pos": Output("p", "pos", sigma=0.05)},
+        initial={"p": Initial(0.0), "v": Initial(0.0)},
+    )
+    true = spring.plus("v", "-a*p**3", {"a": Parameter(0.05)})
+    experiment = Experiment(30.0, 0.05, (0.0, 0.0))
+    record, _ = Case("spring", "", spring, true, experiment).simulate(0.03, 1)
+    case = Case("spring", "", spring, measured=lambda folder: record)
+    monkeypatch.setattr(plugins, "cases", lambda: {"spring": case})
+    offered = {name: plugins.effects()[name] for name in ("cubic_stiffness", "quadratic_drag")}
+    monkeypatch.setattr(plugins, "effects", lambda: offered)
+    for target, effects, said in (
+        (0.1, ("cubic_stiffness",), "yes"),
+        (0.1, ("quadratic_drag",), "effect"),
+        (1e-3, ("cubic_stiffness",), "error"),
+        (1e-3, ("quadratic_drag",), "no"),
+    ):
+        monkeypatch.setattr(held_out, "TARGETS", {("spring", "last 30 %"): held_out.Target(target, effects)})
+        asked = argparse.Namespace(only="spring", data=None, output=tmp_path, json=False)
+        assert held_out.verb(asked) == 0
+        assert f" {said} " in capsys.readouterr().out
+    (row,) = json.loads((tmp_path / "measured.json").read_text(encoding="utf-8"))
+    assert row["named"] == ["cubic_stiffness in v"]
+    assert (row["part"], row["output"], row["verdict"], row["end"]) == ("last 30 %", "pos", "missing_effect", "adequate")
+    sigma = 0.03 * record.y.std()
+    assert row["after"] == pytest.approx(sigma, rel=0.15)
+    assert row["before"] > 1.4 * sigma
+    # The parameters are those of the model that discovery ended with.
+    assert row["parameters"]["a"] == pytest.approx(0.05, rel=0.05)
+    assert row["samples"] < 0.75 * len(record)
+    table = (tmp_path / "measured.csv").read_text(encoding="utf-8")
+    assert "plausible" not in table
+    assert "cubic_stiffness" in table
+    # The picture of the row is drawn of a model built again from it, and refuses a row that is not of this case.
+    drawn = gallery.picture(case, row, None, offered)
+    assert f"falls from {row['before']:.3g} to {row['after']:.3g}" in str(drawn.get_label())
+    with pytest.raises(DataError, match="bench measured"):
+        gallery.picture(case, {**row, "after": 2.0 * row["after"]}, None, offered)
+    with pytest.raises(DataError, match="no candidate"):
+        gallery.picture(case, {**row, "named": ["no_such in v"]}, None, offered)

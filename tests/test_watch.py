@@ -92,6 +92,19 @@ def test_the_watcher_runs_its_filters_as_if_each_were_alone() -> None:
     assert found.coefficients_sd[0] < 0.5 * start.coefficients_sd[0]
 
 
+def test_a_sample_without_a_measurement_forgets_nothing() -> None:
+    """What is known of the coefficient stays through a gap; the first measured sample after it forgets its own step."""
+    run = record(4, np.inf, 20.0)
+    prior = first_prior(SPRING, run.part(0, 40))
+    squares = LeastSquares(CUBIC, prior, {"a": 0.1}, {}, 10.0, 1)
+    for t, y in zip(run.t[:200].tolist(), run.y[:200], strict=True):
+        squares.add(t, np.zeros(0), y)
+    known = squares.filter.P[-1, -1]
+    for t in run.t[200:300].tolist():
+        squares.add(t, np.zeros(0), np.array([np.nan]))
+    assert squares.filter.P[-1, -1] == pytest.approx(known, rel=1e-9)
+
+
 @pytest.mark.parametrize("channels", [1, 3])
 def test_the_alarm_comes_at_its_stated_rate_on_noise(channels: int) -> None:
     """White innovations of unit variance raise it once in 1 / rate samples, within 4 standard errors of 150 waits."""
