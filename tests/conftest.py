@@ -69,6 +69,27 @@ def plants() -> SimpleNamespace:
     return SimpleNamespace(OSCILLATOR=OSCILLATOR, PENDULUM=PENDULUM, PRIOR=PRIOR, record=record_of)
 
 
+def bench_rows_of(
+    errors: dict[str, float], cases: int = 8, seeds: int = 10, variant: str = "default"
+) -> list[dict[str, Any]]:
+    """Rows of methods whose state errors are `errors`, with a tenth of scatter; inf fails."""
+    rng = np.random.default_rng(0)
+    return [
+        {"case": f"case{case}", "noise": 0.05, "estimator": name, "variant": variant, "seed": seed,
+         "status": "ok" if np.isfinite(error) else "diverged",
+         "reason": "" if np.isfinite(error) else f"not finite from t = {seed} <on>",
+         "state_nrmse": error * np.exp(0.1 * rng.standard_normal()), "d_nrmse": error, "nees": 1.0, "nis": 1.0,
+         "step_us": 10.0, "seconds": 0.01, "tuning": {}, "versions": {"unmodelled": "0"}, "when": 1e9}
+        for case in range(cases) for name, error in errors.items() for seed in range(seeds)
+    ]  # fmt: skip
+
+
+@pytest.fixture(scope="session")
+def bench_rows() -> Callable[..., list[dict[str, Any]]]:
+    """A maker of stored rows of a benchmark, by the state error of each method."""
+    return bench_rows_of
+
+
 class Served:
     """A running `unmodelled serve`: its process, the address it printed, its parts, and the folder of its files."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -22,18 +23,7 @@ from suite.metric import Judged, Metric
 from suite.report import bench_page
 from suite.report.bench_matrix import color, matrix
 
-
-def _rows(errors: dict[str, float], cases: int = 8, seeds: int = 10, variant: str = "default") -> list[dict[str, Any]]:
-    """Rows of methods whose state errors are `errors`, with a tenth of scatter; inf fails."""
-    rng = np.random.default_rng(0)
-    return [
-        {"case": f"case{case}", "noise": 0.05, "estimator": name, "variant": variant, "seed": seed,
-         "status": "ok" if np.isfinite(error) else "diverged",
-         "reason": "" if np.isfinite(error) else f"not finite from t = {seed} <on>",
-         "state_nrmse": error * np.exp(0.1 * rng.standard_normal()), "d_nrmse": error, "nees": 1.0, "nis": 1.0,
-         "step_us": 10.0, "seconds": 0.01, "tuning": {}, "versions": {"unmodelled": "0"}, "when": 1e9}
-        for case in range(cases) for name, error in errors.items() for seed in range(seeds)
-    ]  # fmt: skip
+Rows = Callable[..., list[dict[str, Any]]]
 
 
 def test_the_critical_difference_is_demsars() -> None:
@@ -91,9 +81,9 @@ def test_an_interval_is_that_of_resampled_medians() -> None:
     assert statistics.interval(values)[1] == pytest.approx(np.quantile(plain, 0.025), abs=0.08)
 
 
-def test_the_best_not_beaten_are_those_that_chance_cannot_tell() -> None:
+def test_the_best_not_beaten_are_those_that_chance_cannot_tell(bench_rows: Rows) -> None:
     """A twin of the best is not beaten, one three times worse is; few seeds cannot show it."""
-    c = compare(_rows({"a": 1.0, "twin": 1.001, "worse": 3.0, "ekf": np.inf}))
+    c = compare(bench_rows({"a": 1.0, "twin": 1.001, "worse": 3.0, "ekf": np.inf}))
     scores = {m: c.by_seed(m, c.conditions[0]) for m in c.methods()}
     best, equals, able = ranking.not_beaten(scores)
     assert best is not None
@@ -110,33 +100,33 @@ def test_what_ran_on_few_seeds_wins_only_on_those() -> None:
     assert (best, equals, able) == ("full", {"full", "lucky"}, True)
 
 
-def test_a_difference_that_nobody_would_notice_is_no_victory() -> None:
+def test_a_difference_that_nobody_would_notice_is_no_victory(bench_rows: Rows) -> None:
     """Half a per cent on every case, however sure."""
-    rows = _rows({"generalized-ie": 1.0})
+    rows = bench_rows({"generalized-ie": 1.0})
     rows += [{**row, "estimator": "ekf", "state_nrmse": 0.995 * row["state_nrmse"]} for row in rows]
     said = findings.verdict(compare(rows))
     assert said[0].startswith("Neither side wins: the best Kalman filter and the best model-error estimator are level")
 
 
-def test_a_method_without_any_error_is_no_trouble() -> None:
+def test_a_method_without_any_error_is_no_trouble(bench_rows: Rows) -> None:
     """A plant that stands still is estimated exactly: a ratio of zero."""
-    said = findings.verdict(compare(_rows({"generalized-ie": 0.0, "ekf": 1.0})))
+    said = findings.verdict(compare(bench_rows({"generalized-ie": 0.0, "ekf": 1.0})))
     assert said[0].startswith("A model-error estimator beats the best Kalman filter: generalized-ie has 0.00 times")
 
 
-def test_the_champion_has_enough_seeds() -> None:
+def test_the_champion_has_enough_seeds(bench_rows: Rows) -> None:
     """Who would rank before it on fewer is named beside it."""
-    rows = _rows({"generalized-ie": 0.5, "ekf": 1.0, "conventional-ie": 0.4})
+    rows = bench_rows({"generalized-ie": 0.5, "ekf": 1.0, "conventional-ie": 0.4})
     said = findings.verdict(compare(row for row in rows if row["estimator"] != "conventional-ie" or row["seed"] < 2))
     assert any("generalized-ie ranks best" in s and "conventional-ie (2) would rank before it" in s for s in said)
     assert "1 of them, slow ones, have fewer than 6 seeds" in said[2]
 
 
-def test_reference_rows_are_never_ranked() -> None:
+def test_reference_rows_are_never_ranked(bench_rows: Rows) -> None:
     """An oracle better than all wins nothing, and stands apart in the matrix."""
-    rows = _rows({"generalized-ie": 0.5, "ekf": 1.0})
+    rows = bench_rows({"generalized-ie": 0.5, "ekf": 1.0})
     for name, error in (("oracle", 0.01), ("bound", 0.001)):
-        rows += [{**row, "kind": "reference"} for row in _rows({name: error})]
+        rows += [{**row, "kind": "reference"} for row in bench_rows({name: error})]
     c = compare(rows)
     assert {m.estimator for m in c.methods()} == {"generalized-ie", "ekf"}
     assert {m.estimator for m in c.references} == {"oracle", "bound"}
@@ -146,14 +136,14 @@ def test_reference_rows_are_never_ranked() -> None:
     assert not any("oracle" in sentence or "bound" in sentence for sentence in findings.verdict(c))
 
 
-def test_the_verdict_follows_the_numbers() -> None:
+def test_the_verdict_follows_the_numbers(bench_rows: Rows) -> None:
     """Who has the smaller errors is said to win, a tie is said to be one, and who fails is named with its count."""
-    said = findings.verdict(compare(_rows({"generalized-ie": 0.5, "ekf": 1.0, "sra": np.inf})))
+    said = findings.verdict(compare(bench_rows({"generalized-ie": 0.5, "ekf": 1.0, "sra": np.inf})))
     assert said[0].startswith("A model-error estimator beats the best Kalman filter: generalized-ie has 0.")
     assert any("Who breaks: sra 80 of 80" in sentence for sentence in said)
-    said = findings.verdict(compare(_rows({"generalized-ie": 1.0, "ekf": 0.3})))
+    said = findings.verdict(compare(bench_rows({"generalized-ie": 1.0, "ekf": 0.3})))
     assert said[0].startswith("A Kalman filter beats the best model-error estimator: ekf has 0.")
-    tie = findings.verdict(compare(_rows({"generalized-ie": 1.0, "ekf": 1.0}, cases=7)))
+    tie = findings.verdict(compare(bench_rows({"generalized-ie": 1.0, "ekf": 1.0}, cases=7)))
     assert tie[0].startswith("Neither side wins")
 
 

@@ -192,7 +192,12 @@ def test_a_case_is_judged_on_the_part_that_discovery_never_saw(
         assert f" {said} " in capsys.readouterr().out
     (row,) = json.loads((tmp_path / "measured.json").read_text(encoding="utf-8"))
     assert row["named"] == ["cubic_stiffness in v"]
-    assert (row["part"], row["output"], row["verdict"], row["end"]) == ("last 30 %", "pos", "missing_effect", "adequate")
+    assert (row["part"], row["output"], row["verdict"], row["end"]) == (
+        "last 30 %",
+        "pos",
+        "missing_effect",
+        "adequate",
+    )
     sigma = 0.03 * record.y.std()
     assert row["after"] == pytest.approx(sigma, rel=0.15)
     assert row["before"] > 1.4 * sigma

@@ -11,10 +11,10 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from suite.__main__ import main
 from suite.benchmark import better
 from suite.benchmark.table_one import TRUE_A3
 from suite.benchmark.worker import Failure
-from suite.__main__ import main
 from suite.report import table_one_figures
 
 LIKELIHOOD = "maximum likelihood after adding the term"
@@ -64,9 +64,7 @@ def test_likelihood_reaches_the_bound_and_the_bound_is_one(page: Page) -> None:
 def test_a_regression_on_d_falls_short_more_and_more(page: Page) -> None:
     """The note on the page: the estimators' first look is nearest at little noise, and never beyond the truth."""
     for measured in better.MEASURED:
-        short = [
-            TRUE_A3 - page.a3["invariant embedding, likelihood-tuned", measured, noise] for noise in better.NOISES
-        ]
+        short = [TRUE_A3 - page.a3["invariant embedding, likelihood-tuned", measured, noise] for noise in better.NOISES]
         assert short[0] > 0.0
         assert short == sorted(short)
 

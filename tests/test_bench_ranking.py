@@ -1,0 +1,77 @@
+"""The figures that rank methods, and the sentences beside them, say what the ranks say."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from suite.benchmark import findings
+from suite.benchmark.comparison import compare
+from suite.benchmark.ranking import cliques, critical_difference
+from suite.report import bench_ranking
+
+Rows = Callable[..., list[dict[str, Any]]]
+
+APART = {"generalized-ie": 1.0, "conventional-ie": 2.0, "sra": 4.0, "ekf": 3.0, "ukf": 3.0}
+ALIKE = {"generalized-ie": 1.0, "conventional-ie": 1.0, "sra": 1.0, "ekf": 1.0}
+
+
+@pytest.mark.parametrize(("errors", "said"), [(APART, "differ by more than chance"), (ALIKE, "could be chance")])
+def test_the_sentence_on_ranks_is_friedmans(errors: dict[str, float], said: str, bench_rows: Rows) -> None:
+    """Clear orders differ by more than chance, equal methods do not, and the page says which."""
+    (sentence,) = (text for text in findings.verdict(compare(bench_rows(errors))) if "(Friedman, 8 cases" in text)
+    assert f"The ranks of these methods {said} (Friedman" in sentence
+
+
+@pytest.mark.parametrize("errors", [APART, ALIKE])
+def test_the_diagram_joins_what_does_not_differ(errors: dict[str, float], bench_rows: Rows) -> None:
+    """Every method is named with its mean rank, the better half at the left; a bar a clique, of the right ends."""
+    c = compare(bench_rows(errors))
+    figure = bench_ranking.critical_differences(c, "default")
+    assert figure is not None
+    (axes,) = figure.axes
+    methods = c.methods("default")
+    means = c.ranks(methods).mean(axis=1).tolist()
+    texts = [text.get_text() for text in axes.texts]
+    for i, (method, mean) in enumerate(zip(methods, means, strict=True)):
+        left = i < -(-len(methods) // 2)
+        assert (f"{method.estimator}  {mean:.1f}" if left else f"{mean:.1f}  {method.estimator}") in texts
+    width = critical_difference(len(methods), len(c.cases))
+    assert f"critical difference {width:.1f}" in texts
+    bars = [sorted(line.get_xdata()) for line in axes.lines if line.get_linewidth() == 3.5]
+    wanted = [(means[first], means[last]) for first, last in cliques(means, width)]
+    assert np.array(bars) + (0.06, -0.06) == pytest.approx(np.array(wanted).reshape(-1, 2))
+
+
+def test_no_diagram_of_one_method_or_one_case(bench_rows: Rows) -> None:
+    """There is nothing to rank; no figure is better than an empty one."""
+    assert bench_ranking.critical_differences(compare(bench_rows({"ekf": 1.0})), "default") is None
+    assert bench_ranking.critical_differences(compare(bench_rows(ALIKE, cases=1)), "default") is None
+
+
+def test_the_profile_and_the_front_show_who_is_best(bench_rows: Rows) -> None:
+    """Highest at one is who is the best most often; on the front is whom none beats in both cost and error."""
+    rows = bench_rows(APART)
+    for row in rows:
+        row["step_us"] = {"ekf": 1.0, "generalized-ie": 5.0}.get(str(row["estimator"]), 9.0)
+    c = compare(rows)
+    curves = {
+        line.get_label(): np.asarray(line.get_ydata()) for line in bench_ranking.performance_profile(c).axes[0].lines
+    }
+    assert curves["generalized-ie"][0] == 1.0
+    assert curves["ekf"][0] == 0.0
+    assert all(curve[-1] == 1.0 and np.all(np.diff(curve) >= 0) for curve in curves.values())
+    figure = bench_ranking.pareto(c)
+    assert figure is not None
+    assert sorted(text.get_text() for text in figure.axes[0].texts) == ["ekf", "generalized-ie"]
+
+
+def test_more_curves_than_colours_are_grey_and_counted(bench_rows: Rows) -> None:
+    """The best keep their names; the others are drawn, and the legend says how many they are."""
+    c = compare(bench_rows({f"method{k}": 1.0 + k for k in range(bench_ranking.NAMED + 3)}))
+    labels = [line.get_label() for line in bench_ranking.performance_profile(c).axes[0].lines]
+    assert "3 others" in labels
+    assert [f"method{k}" in labels for k in (0, bench_ranking.NAMED - 1, bench_ranking.NAMED)] == [True, True, False]
