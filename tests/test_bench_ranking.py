@@ -43,7 +43,7 @@ def test_the_diagram_joins_what_does_not_differ(errors: dict[str, float], bench_
     assert f"critical difference {width:.1f}" in texts
     bars = [sorted(line.get_xdata()) for line in axes.lines if line.get_linewidth() == 3.5]
     wanted = [(means[first], means[last]) for first, last in cliques(means, width)]
-    assert np.array(bars) + (0.06, -0.06) == pytest.approx(np.array(wanted).reshape(-1, 2))
+    assert np.array(bars) + np.array([0.06, -0.06]) == pytest.approx(np.array(wanted).reshape(-1, 2))
 
 
 def test_no_diagram_of_one_method_or_one_case(bench_rows: Rows) -> None:

@@ -178,11 +178,24 @@ def test_bins_and_cells_hold_all_samples() -> None:
     assert b.count.sum() == 600
     assert np.isnan(b.mean[b.count == 0]).all()
     assert np.nanmax(b.sd) < 0.1
+    np.testing.assert_array_equal(b.count, np.histogram(SWING, b.edges)[0])
+    centre = 0.5 * (b.edges[1:] + b.edges[:-1])
+    assert b.mean[[0, -1]] == pytest.approx(-(centre[[0, -1]] ** 3), rel=0.2)
     cells = state_map(OSCILLATOR, error)
     assert cells is not None
     assert (cells.x, cells.y) == ("p", "v")
     assert cells.count.sum() == 600
     assert np.isnan(cells.mean[cells.count == 0]).all()
+
+
+@pytest.mark.parametrize("value", [0.0, 2.5])
+def test_a_variable_that_never_changes_is_in_one_bin(value: float) -> None:
+    """As many bins as for any variable, of a width above zero, and all samples in the first."""
+    error, record = found(T, SWING, -(SWING**3))
+    b = bins(error, np.full(len(T), value), record, 1)
+    assert len(b.edges) == len(b.count) + 1 == len(bins(error, SWING, record, 1).edges)
+    assert np.all(np.diff(b.edges) > 0)
+    assert b.count.tolist() == [len(T)] + [0] * (len(b.count) - 1)
 
 
 @pytest.mark.parametrize("colour", [0.0, 0.7])
