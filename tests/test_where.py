@@ -15,10 +15,10 @@ from suite.case import Case, Experiment
 from suite.discovery.discrepancy import discrepancy
 from suite.discovery.evidence import MOST, to_json
 from suite.discovery.fit import prepare
-from suite.discovery.misfit import compare
+from suite.discovery.misfit import _worst, compare
 from suite.discovery.result import Discrepancy
 from suite.discovery.state_map import axes, bins, state_map
-from suite.discovery.where import where
+from suite.discovery.where import _passages, where
 from suite.discovery.whiteness import BAND, LAGS, cross_correlation, whiteness
 from suite.model import Initial, Input, Model, Output, Parameter
 from suite.record import Record
@@ -188,6 +188,27 @@ def test_bins_and_cells_hold_all_samples() -> None:
     assert np.isnan(cells.mean[cells.count == 0]).all()
 
 
+def test_a_passage_survives_two_samples_outside_and_not_three() -> None:
+    """Single samples are noise beside real passages, and all there is where there are none."""
+    inside = np.array([bool(int(letter)) for letter in "0111001110001110100"])
+    assert _passages(inside) == [(1, 9), (12, 17)]
+    inside = np.array([bool(int(letter)) for letter in "01000000100011100"])
+    assert _passages(inside) == [(12, 15)]
+    assert _passages(inside[:12]) == [(1, 2), (8, 9)]
+    assert _passages(np.zeros(5, dtype=bool)) == []
+
+
+def test_the_three_worst_parts_are_named_with_their_run_and_times() -> None:
+    """Of five parts that fail, the three largest, largest first; noise alone has none."""
+    t = np.arange(400.0)
+    record = Record(t, np.zeros((400, 0)), np.zeros((400, 1)), (0, 200))
+    e = np.random.default_rng(1).standard_normal((400, 1))
+    assert _worst(record, e) == ()
+    for first, size in ((30, 6.0), (70, 9.0), (110, 5.0), (240, 12.0), (300, 7.0)):
+        e[first : first + 10] += size
+    assert _worst(record, e) == ((1, 240.0, 249.0), (0, 70.0, 79.0), (1, 300.0, 309.0))
+
+
 @pytest.mark.parametrize("value", [0.0, 2.5])
 def test_a_variable_that_never_changes_is_in_one_bin(value: float) -> None:
     """As many bins as for any variable, of a width above zero, and all samples in the first."""
@@ -196,6 +217,8 @@ def test_a_variable_that_never_changes_is_in_one_bin(value: float) -> None:
     assert len(b.edges) == len(b.count) + 1 == len(bins(error, SWING, record, 1).edges)
     assert np.all(np.diff(b.edges) > 0)
     assert b.count.tolist() == [len(T)] + [0] * (len(b.count) - 1)
+    assert np.isfinite([b.mean[0], b.sd[0]]).all()
+    assert np.isnan([b.mean[1:], b.sd[1:]]).all()
 
 
 @pytest.mark.parametrize("colour", [0.0, 0.7])
