@@ -37,6 +37,12 @@ def test_cliques_join_what_does_not_differ() -> None:
     """Bars cover all pairs closer than the difference, none farther, and no bar lies within another."""
     means = [1.0, 1.5, 2.6, 4.0, 4.2]
     assert ranking.cliques(means, 1.2) == [(0, 1), (1, 2), (3, 4)]
+    rng = np.random.default_rng(4)
+    for _ in range(200):
+        means = np.sort(rng.uniform(1.0, 9.0, 8)).tolist()
+        near = [(i, j) for i in range(8) for j in range(i + 1, 8) if means[j] - means[i] <= 1.7]
+        largest = [(i, j) for i, j in near if not any(a <= i and j <= b and (a, b) != (i, j) for a, b in near)]
+        assert ranking.cliques(means, 1.7) == largest
 
 
 def test_a_profile_counts_failures_as_never_solved() -> None:

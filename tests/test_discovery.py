@@ -11,6 +11,7 @@ import pytest
 
 from suite import plugins
 from suite.case import Case, Experiment
+from suite.discovery import noise
 from suite.discovery.discrepancy import discrepancy
 from suite.discovery.fit import fit, prepare
 from suite.discovery.frame import Point
@@ -53,8 +54,8 @@ def test_the_removed_cubic_spring_is_found_within_three_deviations(paper: Case, 
     assert last.verdict.verdict == "adequate"
     assert last.verdict.detection["ljung_box_p"] > 0.001
     truth = paper.simulate(0.05, 7)[1].noise
-    for error, noise in zip(last.comparison.error.values(), truth, strict=True):
-        assert 0.9 < error / noise < 1.1
+    for error, sigma in zip(last.comparison.error.values(), truth, strict=True):
+        assert 0.9 < error / sigma < 1.1
 
 
 @pytest.mark.parametrize("seed", [1, 2, 7])
@@ -163,14 +164,18 @@ def test_a_parameter_in_disguise_is_no_candidate(paper: Case, record: Record) ->
     assert absorbed == {"linear_stiffness", "viscous_damping"}
 
 
-def test_noise_is_read_off_smooth_and_uneven_records() -> None:
-    """Fourth differences give the noise within 20 % on even and on uneven steps."""
+def test_noise_is_read_off_smooth_and_uneven_records(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fourth differences give the noise within 20 % on even and on uneven steps, whole or in parts."""
     rng = np.random.default_rng(5)
     model = Model("m", {"x": "-x"}, outputs={"x": Output("x", "x")})
     for t in (np.arange(400) * 0.05, np.cumsum(rng.uniform(0.02, 0.08, 400))):
         y = np.sin(t) + 0.03 * rng.standard_normal(400)
         record = Record(t, np.zeros((400, 0)), y[:, None])
         assert np.sqrt(noise_variance(model, record)[0]) == pytest.approx(0.03, rel=0.2)
+        squares = noise._innovation(t, y)
+        monkeypatch.setattr(noise, "PART", 37)
+        np.testing.assert_array_equal(noise._innovation(t, y), squares)
+        monkeypatch.undo()
 
 
 def test_intervals_of_a_fit_cover_the_truth(paper: Case) -> None:

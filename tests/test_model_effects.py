@@ -187,3 +187,14 @@ def test_the_documented_tables_are_read() -> None:
     model = from_toml("".join(re.findall(r"```toml\n(.*?)```", text, re.DOTALL)), "plant.toml")
     assert [effect.id for effect in model.effects] == ["magnet", "creep"]
     assert all(f"| `{key}` |" in text for key in KEYS)
+
+
+def test_the_variable_of_a_term_is_what_its_scale_is_of() -> None:
+    """A scale stands in a bracket with what it is a scale of; without one the equation's own state comes first."""
+    term = "'-a*v*F*tanh(p/w)'"
+    scaled = from_toml(mine(term=term, roles="", equation="'v'"), "scaled")
+    assert [(t.text, t.variable) for t in candidates(scaled, {})] == [("-a*v*F*tanh(p/w)", "p")]
+    plain = from_toml(mine(term="'-a*F*p'", roles="", inner="", equation="'v'"), "plain")
+    assert [t.variable for t in candidates(plain, {})] == ["p"]
+    own = from_toml(mine(term="'-a*F*v*p'", roles="", inner="", equation="'v'"), "own")
+    assert [t.variable for t in candidates(own, {})] == ["v"]

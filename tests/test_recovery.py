@@ -111,6 +111,9 @@ def test_methods_are_compared_on_the_same_records() -> None:
     rival = made_up(estimator="pysindy", seed=1, exact=False)
     line = next(line for line in recovery_summary.by_method([*ours, rival]) if line["method"] == "pysindy")
     assert (line["records"], line["first"], line["exact"], line["ours_exact"]) == (1, 1.0, 0.0, 0.0)
+    broken = made_up(estimator="pysindy", seed=0, status="error", reason="singular", first=False, exact=False)
+    line = next(line for line in recovery_summary.by_method([*ours, rival, broken]) if line["method"] == "pysindy")
+    assert (line["records"], line["failed"], line["first"], line["reason"]) == (2, 1, 0.5, "singular")
 
 
 @pytest.mark.parametrize(("share", "count"), [(0.02, 40), (0.5, 20), (0.95, 60)])

@@ -17,7 +17,7 @@ import pytest
 
 from suite.benchmark import cluster, pool
 from suite.benchmark.store import Store
-from suite.benchmark.worker import Failure, Task
+from suite.benchmark.worker import Failure, Task, Worker
 from suite.errors import InputError
 
 # What a second distribution might install; a line in $CALLS says which cell was computed, by its noise's first draw.
@@ -202,6 +202,21 @@ def test_a_folder_that_cannot_be_written_is_a_sentence(path: str) -> None:
     """One sentence that names the file."""
     with pytest.raises(InputError, match=path):
         Store(Path(path))
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="memory is watched where there is /proc")
+def test_the_memory_of_a_worker_is_what_is_resident() -> None:
+    """The kernel's own figure, not the address space, which is many times as large."""
+    worker = Worker(60.0, 1000.0)
+    try:
+        while not worker.ready:
+            assert not isinstance(worker.look(worker.pipe.poll(0.05)), Failure)
+        status = Path(f"/proc/{worker.process.pid}/status").read_text()
+        (kib,) = (int(line.split()[1]) for line in status.splitlines() if line.startswith("VmRSS"))
+        assert worker.resident() == pytest.approx(kib / 1024.0, rel=0.1)
+    finally:
+        worker.end()
+    assert worker.resident() == 0.0
 
 
 def test_a_worker_killed_at_rest_or_at_work_costs_one_task_at_most() -> None:

@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 from suite.__main__ import main
-from suite.benchmark import better
+from suite.benchmark import better, table_one
 from suite.benchmark.table_one import TRUE_A3
 from suite.benchmark.worker import Failure
+from suite.record import Record
 from suite.report import table_one_figures
 
 LIKELIHOOD = "maximum likelihood after adding the term"
@@ -111,3 +112,14 @@ def test_the_spread_is_that_of_a_sample() -> None:
     values = (0.0190, 0.0195, 0.0206)
     text = better.Entry("any", ("x1",), 0.1, values).text
     assert text == f"{1e4 * np.mean(values):.1f} +- {1e4 * np.std(values, ddof=1):.1f}"
+
+
+def test_a_held_sample_is_the_mean_over_its_step() -> None:
+    """Times rise from each sample to just before the next; of a line within each step, the mean is that of its ends."""
+    record = Record(np.array([0.0, 0.5, 2.0]), np.zeros((3, 0)), np.array([[1.0], [2.0], [9.0]]))
+    held = table_one._held(record)
+    assert np.all(np.diff(held.t) > 0)
+    assert held.t[[0, -1]] == pytest.approx([0.0, 0.5 + 0.999 * 1.5])
+    assert held.y[held.t < 0.5].tolist() == [[1.0]] * (len(held) // 2)
+    assert held.y[held.t >= 0.5].tolist() == [[2.0]] * (len(held) // 2)
+    assert table_one._hold_means(held.t[:, None]).ravel() == pytest.approx([0.999 * 0.25, 0.5 + 0.999 * 0.75])
