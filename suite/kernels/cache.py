@@ -23,7 +23,7 @@ def folder() -> Path | None:
     """The writable folder for compiled code ($UNMODELLED_CACHE, else the user's cache), or None with one warning."""
     named = os.environ.get("UNMODELLED_CACHE")
     try:
-        base = Path(named) if named else Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "unmodelled"
+        base = Path(named) if named else Path(os.environ.get("XDG_CACHE_HOME") or _home() / ".cache") / "unmodelled"
     except RuntimeError:
         # A user without a home, as in some containers.
         _cannot_be_kept("the user's cache", "the user has no home")
@@ -36,6 +36,13 @@ def folder() -> Path | None:
         _cannot_be_kept(base, error.strerror)
         return None
     return base
+
+
+def _home() -> Path:
+    """The user's home; RuntimeError where there is none. Python takes an empty HOME for the root folder."""
+    if os.environ.get("HOME") == "":
+        raise RuntimeError("HOME is empty")
+    return Path.home()
 
 
 @cache

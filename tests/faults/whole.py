@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import json
+import pickletools
 import sqlite3
 import tomllib
 import xml.etree.ElementTree as ElementTree
@@ -13,6 +15,8 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pyarrow.parquet as pq
+
+from suite.kernels.object_code import DIGEST
 
 LEFT = ".tmp"
 
@@ -73,6 +77,21 @@ def _text(path: Path) -> None:
         raise ValueError("no end of line at its end")
 
 
+def _pickles(path: Path) -> None:
+    """The files of numba's cache: one pickle after another, none of them run."""
+    with path.open("rb") as handle:
+        while handle.peek(1):
+            for _ in pickletools.genops(handle):
+                pass
+
+
+def _code(path: Path) -> None:
+    """Object code behind its hash."""
+    content = path.read_bytes()
+    if hashlib.sha256(content[DIGEST:]).digest() != content[:DIGEST]:
+        raise ValueError("it does not fit its hash")
+
+
 KINDS: dict[str, Callable[[Path], object]] = {
     ".sqlite": _store,
     ".sqlite-wal": lambda path: None,
@@ -84,5 +103,8 @@ KINDS: dict[str, Callable[[Path], object]] = {
     ".json": lambda path: json.loads(path.read_text(encoding="utf-8")),
     ".toml": lambda path: tomllib.loads(path.read_text(encoding="utf-8")),
     ".svg": lambda path: ElementTree.fromstring(path.read_text(encoding="utf-8")),
+    ".nbi": _pickles,
+    ".nbc": _pickles,
+    ".o": _code,
     ".parquet": lambda path: pq.read_table(path, use_threads=False).validate(full=True),
 }
