@@ -56,6 +56,7 @@ def _open_streams() -> None:
 
 def _stop(number: int, frame: FrameType | None) -> None:
     signal.signal(number, signal.SIG_DFL)
+    sys.unraisablehook = _half_made
     if number == signal.SIGINT:
         raise KeyboardInterrupt
     sys.exit(128 + number)
@@ -71,6 +72,12 @@ def _unraisable(what: Any) -> None:
     later = threading.Timer(AGAIN, _send, (number,))
     later.daemon = True
     later.start()
+
+
+def _half_made(what: Any) -> None:
+    """The same after a signal, where a destructor may miss what its constructor did not reach: no word of that."""
+    if issubclass(what.exc_type, (KeyboardInterrupt, SystemExit)):
+        _unraisable(what)
 
 
 def _send(number: int) -> None:

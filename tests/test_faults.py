@@ -179,33 +179,6 @@ def test_streams_that_are_full_closed_or_not_read_end_in_an_exit_code(tmp_path: 
     assert (done.returncode, done.stderr) == (0, "")
 
 
-DROPPED = """
-import signal, sys, time
-from suite import ending
-
-class Interrupted:
-    def __del__(self):
-        signal.raise_signal(signal.SIGINT)
-
-ending.prepare()
-try:
-    Interrupted()
-    time.sleep(600)
-    print("went on")
-except KeyboardInterrupt:
-    print("stopped", flush=True)
-    signal.raise_signal(signal.SIGINT)
-    print("a second one goes through")
-"""
-
-
-def test_an_interrupt_is_not_lost_in_a_destructor_and_a_second_one_ends_at_once() -> None:
-    """Python drops exceptions there, with a traceback; the interrupt comes again."""
-    process = _python(DROPPED)
-    assert process.communicate(timeout=120) == ("stopped\n", "")
-    assert process.returncode == -signal.SIGINT
-
-
 def test_memory_that_ends_is_a_sentence(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     """Exit code 2, not a traceback."""
 
@@ -248,6 +221,15 @@ with warnings.catch_warnings(record=True) as caught:
     import kernel
 print(kernel.twice(21.0), [str(w.message)[:28] for w in caught if "compiled code" in str(w.message)])
 """
+
+
+def test_an_empty_home_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Python takes it for the root folder, where nothing of ours belongs, also where it may be written."""
+    for name in ("HOME", "XDG_CACHE_HOME", "UNMODELLED_CACHE"):
+        monkeypatch.setenv(name, "")
+    cache._cannot_be_kept.cache_clear()
+    with pytest.warns(RuntimeWarning, match="the user has no home"):
+        assert cache.folder.__wrapped__() is None
 
 
 def test_a_full_disk_for_compiled_code_costs_time_alone(tmp_path: Path) -> None:

@@ -15,7 +15,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from suite.kernels import cache
 from suite.kernels.integrate import advance, workspace
 from suite.kernels.prediction import prediction_errors
 from suite.kernels.step import step
@@ -273,12 +272,3 @@ def test_without_a_writable_cache_there_is_one_warning_and_the_same_numbers(tmp_
     assert numbers == "1.0 2.0", err
     assert warned.count("cannot be kept") == 1
     assert "UNMODELLED_CACHE" in warned
-
-
-def test_an_empty_home_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Python takes it for the root folder, where nothing of ours belongs, also where it may be written."""
-    for name in ("HOME", "XDG_CACHE_HOME", "UNMODELLED_CACHE"):
-        monkeypatch.setenv(name, "")
-    cache._cannot_be_kept.cache_clear()
-    with pytest.warns(RuntimeWarning, match="the user has no home"):
-        assert cache.folder.__wrapped__() is None

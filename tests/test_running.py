@@ -160,7 +160,7 @@ def test_what_never_returns_to_python_and_what_eats_memory_is_ended(bench: Bench
     """A call that keeps the interpreter's lock and one that takes 3 GiB are rows; a cell after them is computed."""
     bench.done(bench.start("run", "--plan", bench.plan("y-*", 1, limit=15.0), "--jobs", "1", "--memory", "600"))
     found = {row["estimator"]: (row["status"], row["reason"]) for row in bench.rows()}
-    assert found["y-eats"] == ("error", "memory: it took more than 600 MiB")
+    assert found["y-eats"] == ("error", "memory: it took more than 600 MiB; --memory allows more")
     assert found["y-spins"] == ("time-out", "not done after 15 s")
     assert found["y-slow"] == ("ok", "")
 
@@ -195,13 +195,6 @@ def test_a_full_disk_is_a_sentence(tmp_path: Path) -> None:
     assert done.stderr.count("\n") == 1
     with Store(path) as store:
         assert [row["seed"] for row in store.rows()] == list(map(int, done.stdout.split()))
-
-
-@pytest.mark.parametrize("path", ["/proc/store.sqlite", "/nowhere/store.sqlite"])
-def test_a_folder_that_cannot_be_written_is_a_sentence(path: str) -> None:
-    """One sentence that names the file."""
-    with pytest.raises(InputError, match=path):
-        Store(Path(path))
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="memory is watched where there is /proc")

@@ -109,3 +109,10 @@ def test_who_lays_out_a_new_store_beside_another_waits_for_its_turn(
     else:
         with pytest.raises(InputError, match=said):
             Store(tmp_path / "new.sqlite")
+
+
+@pytest.mark.parametrize("path", ["/proc/store.sqlite", "/nowhere/store.sqlite"])
+def test_a_folder_that_cannot_be_written_is_a_sentence(path: str) -> None:
+    """One sentence that names the file."""
+    with pytest.raises(InputError, match=path):
+        Store(Path(path))

@@ -92,7 +92,7 @@ class Worker:
             )
         if self.resident() > self.memory:
             self.sound = False
-            return Failure("error", f"memory: it took more than {self.memory:g} MiB")
+            return Failure("error", f"memory: it took more than {self.memory:g} MiB; --memory allows more")
         return RUNNING
 
     def _receive(self) -> Any:

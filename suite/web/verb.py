@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import errno
 import json
 import os
@@ -11,10 +12,12 @@ import socket
 import sys
 import threading
 import webbrowser
+from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 from types import FrameType
 
+from suite.ending import STOPPING
 from suite.errors import InputError
 
 PORT = 8420
@@ -30,8 +33,6 @@ def run(args: argparse.Namespace) -> int:
         if find_spec(name) is None:
             raise InputError(f"the page needs {name}; install it with: pip install 'unmodelled[web]'")
     listener = _bound(args.port)
-    # Ended in order: what is removed at exit is removed then too.
-    signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
     try:
         _serve(args, model, listener)
     except KeyboardInterrupt:
@@ -57,6 +58,18 @@ def _serve(args: argparse.Namespace, model: str | None, listener: socket.socket)
         def handle_exit(self, sig: int, frame: FrameType | None) -> None:
             desk.crew.close()
             super().handle_exit(sig, frame)
+
+        @contextlib.contextmanager
+        def capture_signals(self) -> Iterator[None]:
+            """The end of the terminal too, which uvicorn leaves to whatever runs at that moment."""
+            with super().capture_signals():
+                heard = [number for number in STOPPING if signal.getsignal(number) is not signal.SIG_IGN]
+                before = {number: signal.signal(number, self.handle_exit) for number in heard}
+                try:
+                    yield
+                finally:
+                    for number, handler in before.items():
+                        signal.signal(number, handler)
 
     config = uvicorn.Config(
         application(desk), log_level="error", access_log=False, lifespan="on", ws="none", http="h11",

@@ -100,6 +100,7 @@ KINDS: dict[str, Callable[[Path], object]] = {
     ".html": _page,
     ".png": _png,
     ".md": _text,
+    ".txt": _text,
     ".json": lambda path: json.loads(path.read_text(encoding="utf-8")),
     ".toml": lambda path: tomllib.loads(path.read_text(encoding="utf-8")),
     ".svg": lambda path: ElementTree.fromstring(path.read_text(encoding="utf-8")),
