@@ -34,7 +34,8 @@ def _made(entry: dict[str, Any]) -> int:
 def _ends(entry: dict[str, Any]) -> str:
     if "kills" in entry:
         whom = ", ".join(f"{name} {count}" for name, count in sorted(entry["of"].items()))
-        return f"killed: {whom}; then resumed, to the end in {entry['rounds']} rounds"
+        rounds = f"{entry['rounds']} round{'' if entry['rounds'] == 1 else 's'}"
+        return f"killed: {whom}; then resumed, to the end in {rounds}"
     if entry.get("skipped"):
         return f"not made: {entry['skipped']}"
     return ", ".join(f"{code}: {count}" for code, count in sorted(entry["codes"].items()))
