@@ -11,6 +11,7 @@ import pytest
 from suite.benchmark import findings
 from suite.benchmark.comparison import compare
 from suite.benchmark.ranking import cliques, critical_difference
+from suite.benchmark.statistics import interval
 from suite.report import bench_ranking
 
 Rows = Callable[..., list[dict[str, Any]]]
@@ -75,3 +76,17 @@ def test_more_curves_than_colours_are_grey_and_counted(bench_rows: Rows) -> None
     labels = [line.get_label() for line in bench_ranking.performance_profile(c).axes[0].lines]
     assert "3 others" in labels
     assert [f"method{k}" in labels for k in (0, bench_ranking.NAMED - 1, bench_ranking.NAMED)] == [True, True, False]
+
+
+def test_below_six_cases_a_ratio_has_its_range_and_from_six_an_interval(bench_rows: Rows) -> None:
+    """Five: the smallest and the largest ratio; six: the interval of resampled medians; the sentence says which."""
+    for cases, word in ((5, "range"), (6, "95 % interval")):
+        rows = bench_rows({"generalized-ie": 1.0, "ekf": 3.0}, cases=cases, seeds=3)
+        c = compare(rows)
+        ours, other = (next(m for m in c.rows if m.estimator == name) for name in ("generalized-ie", "ekf"))
+        ratios = c.case_ratios(ours, other)
+        assert len(ratios) == cases
+        found = c.over_cases(ours, other)
+        wanted = interval(ratios) if cases == 6 else (np.median(ratios), ratios.min(), ratios.max())
+        assert found == pytest.approx(wanted)
+        assert any(word in sentence for sentence in findings.verdict(c))
