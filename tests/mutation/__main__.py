@@ -90,6 +90,7 @@ def _keep(args: argparse.Namespace, mutants: list[Mutant], found: dict[str, dict
     names = ("unmodelled", "cosmic-ray", "pytest")
     report = {
         "command": f"python tests/mutation --each {args.each} --seed {args.seed} --rooms {args.rooms}",
+        "seed": args.seed,
         "date": date.today().isoformat(),
         "versions": {"python": sys.version.split()[0], **{name: version(name) for name in names}},
         "rooms": {room: dict(count) for room, count in _rooms(mutants, found).items()},
