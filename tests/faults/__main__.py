@@ -50,9 +50,10 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1, help="of the moments, default 1")
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="JSON file to write")
     args = parser.parse_args()
-    # A run in the background of a script ignores interrupts, and so would the commands that are to be interrupted.
-    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+    # A run in the background of a script ignores these, and so would the commands that are to hear them.
+    for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGHUP, signal.SIG_DFL)):
+        if signal.getsignal(number) is signal.SIG_IGN:
+            signal.signal(number, handler)
     names = args.only.split(",")
     if unknown := set(names) - {*SHARES, *SCENARIOS}:
         parser.error(f"--only: {', '.join(sorted(unknown))}; there are {', '.join([*SHARES, *SCENARIOS])}")
