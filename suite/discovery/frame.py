@@ -75,6 +75,7 @@ class Frame:
 
     @cached_property
     def program(self) -> codegen.Program:
+        """The compiled model with every term behind a gate, delayed inputs as channels of their own."""
         if not self.terms and not self._late:
             return self.model.program
         inputs, late = list(self.model.inputs), self._late
@@ -257,4 +258,5 @@ class Frame:
 
     @cached_property
     def angles(self) -> Array:
+        """1 for each output that is an angle, else 0, (outputs,)."""
         return self.model.angles

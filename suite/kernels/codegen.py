@@ -65,10 +65,12 @@ class Program:
 
     @cached_property
     def rate(self) -> Any:
+        """Compiled f and its slopes: of (t, x, u, p, on, f, Fx, Fp) it writes the last three."""
         return self.functions("rate")
 
     @cached_property
     def output(self) -> Any:
+        """Compiled h and its slopes: of (t, x, u, p, on, y, Hx, Hp) it writes the last three."""
         return self.functions("output")
 
     def step_when(self, on: npt.NDArray[np.int64]) -> int:

@@ -45,9 +45,11 @@ class Lines:
         return f"%v{self.count}"
 
     def load(self, kind: str, pointer: str) -> str:
+        """The name of what stands at a pointer."""
         return self.line(f"load {kind}, {kind}* {pointer}")
 
     def store(self, value: str, pointer: str) -> None:
+        """Write a value to where a pointer points."""
         self.lines.append(f"store double {value}, double* {pointer}")
 
     def value(self, e: Any) -> str:
@@ -58,6 +60,7 @@ class Lines:
         return found
 
     def computed(self, e: Any) -> str:
+        """Lines for an expression that has none yet; the name of its value."""
         if e.is_Number or e.is_NumberSymbol:
             return number(float(e))
         if e.is_Add:
@@ -74,9 +77,11 @@ class Lines:
         raise NotImplementedError(f"{name} cannot be compiled: {e}")
 
     def operation(self, operator: str, left: str, right: str) -> str:
+        """Two values and an operator of LLVM."""
         return self.line(f"{operator} double {left}, {right}")
 
     def call(self, name: str, *arguments: str) -> str:
+        """A function of CALLED at values."""
         return self.line(f"call double @{CALLED[name]}({', '.join(f'double {a}' for a in arguments)})")
 
     def chosen(self, comparison: str, left: str, right: str, then: str, other: str) -> str:
@@ -85,6 +90,7 @@ class Lines:
         return self.line(f"select i1 {holds}, double {then}, double {other}")
 
     def sum(self, terms: Sequence[Any]) -> str:
+        """The terms one after another, a negated one taken away."""
         total = self.value(terms[0])
         for term in terms[1:]:
             if term.is_Mul and term.args[0] == -1:
@@ -110,6 +116,7 @@ class Lines:
         return found
 
     def power(self, base: Any, exponent: Any) -> str:
+        """Whole powers as products, a half as a root."""
         if exponent.is_Integer and 0 < abs(int(exponent)) <= LONGEST_CHAIN:
             chain = self.chain(self.value(base), abs(int(exponent)))
             return chain if exponent > 0 else self.operation("fdiv", ONE, chain)
@@ -118,6 +125,7 @@ class Lines:
         return self.call("pow", self.value(base), self.value(exponent))
 
     def chain(self, square: str, exponent: int) -> str:
+        """A whole power above zero of a value, by squaring."""
         total = ""
         while exponent:
             if exponent & 1:
@@ -127,6 +135,7 @@ class Lines:
         return total
 
     def absolute(self, e: Any) -> str:
+        """Without its sign."""
         return self.call("fabs", self.value(e))
 
     def sign(self, e: Any) -> str:
@@ -136,20 +145,25 @@ class Lines:
         return self.chosen("ogt", x, ZERO, ONE, below)
 
     def step(self, e: Any, *_: Any) -> str:
+        """0, one half at 0, or 1."""
         # One half at the step: of equal arguments of min or max each then counts for its share.
         x = self.value(e)
         return self.chosen("ogt", x, ZERO, ONE, self.chosen("olt", x, ZERO, ZERO, HALF))
 
     def least(self, *terms: Any) -> str:
+        """The smallest; the first of equal ones."""
         return reduce(lambda old, new: self.chosen("olt", new, old, new, old), map(self.value, terms))
 
     def greatest(self, *terms: Any) -> str:
+        """The largest; the first of equal ones."""
         return reduce(lambda old, new: self.chosen("ogt", new, old, new, old), map(self.value, terms))
 
     def tame_power(self, base: Any, exponent: Any) -> str:
+        """The power of a base above zero, else zero."""
         return self.chosen("ogt", self.value(base), ZERO, self.power(base, exponent), ZERO)
 
     def tame_log(self, e: Any) -> str:
+        """The logarithm of what is above zero, else zero."""
         return self.chosen("ogt", self.value(e), ZERO, self.call("log", self.value(e)), ZERO)
 
 
