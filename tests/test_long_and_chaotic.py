@@ -49,6 +49,17 @@ def test_neighbours_of_a_plant_that_ignores_its_states_do_not_part() -> None:
     assert bound[1:] == pytest.approx(np.full(30, 0.5 * np.log(2.0)), abs=1e-12)
 
 
+def test_neighbours_part_as_fast_whether_followed_at_once_or_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of Lorenz-63 along its own path: what is kept of the tangents at a time changes nothing."""
+    case = plugins.cases()["null-lorenz"]
+    record, truth = case.simulate(0.0, 1)
+    whole = chaos._growth(case.deficient, record, truth.x, 0, len(record), exact=True)
+    assert whole[-1] > 1.0
+    monkeypatch.setattr(chaos, "ROOM", 9 * 7)
+    pieces = chaos._growth(case.deficient, record, truth.x, 0, len(record), exact=True)
+    assert pieces == pytest.approx(whole, rel=1e-9)
+
+
 def test_a_complete_chaotic_model_is_adequate_in_stretches() -> None:
     """Lorenz-63 over 15 s forgets its start: the record is cut into stretches, and nothing is missing."""
     case = lasting("null-lorenz", 15.0)

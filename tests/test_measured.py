@@ -214,3 +214,8 @@ def test_a_case_is_judged_on_the_part_that_discovery_never_saw(
         gallery.picture(case, {**row, "after": 2.0 * row["after"]}, None, offered)
     with pytest.raises(DataError, match="no candidate"):
         gallery.picture(case, {**row, "named": ["no_such in v"]}, None, offered)
+    # Of a model that lacks nothing there is one error, before and after.
+    whole = Case("whole", "", true.with_values({"a": 0.05}), measured=lambda folder: record)
+    (row,) = held_out.judge(whole, None, offered)
+    assert (row["named"], row["verdict"], row["end"], row["target"]) == ([], "adequate", "adequate", None)
+    assert row["before"] == row["after"] == pytest.approx(sigma, rel=0.15)

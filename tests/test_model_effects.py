@@ -194,6 +194,8 @@ def test_the_variable_of_a_term_is_what_its_scale_is_of() -> None:
     term = "'-a*v*F*tanh(p/w)'"
     scaled = from_toml(mine(term=term, roles="", equation="'v'"), "scaled")
     assert [(t.text, t.variable) for t in candidates(scaled, {})] == [("-a*v*F*tanh(p/w)", "p")]
+    beside = from_toml(mine(term="'-a*(v + F)*tanh(p/w)'", roles="", equation="'v'"), "beside")
+    assert [t.variable for t in candidates(beside, {})] == ["p"]
     plain = from_toml(mine(term="'-a*F*p'", roles="", inner="", equation="'v'"), "plain")
     assert [t.variable for t in candidates(plain, {})] == ["p"]
     own = from_toml(mine(term="'-a*F*v*p'", roles="", inner="", equation="'v'"), "own")
