@@ -32,12 +32,15 @@ class Choice:
         }
 
     def of(self, mutant: Mutant) -> list[str]:
-        """The tests that run the mutant's line; of compiled code, which is not traced, those that run what calls it."""
+        """The tests that run the mutant's line; of compiled code, which is not traced, those that run what calls it.
+        Beside them those that read its file, which have the name of it in theirs.
+        """
         found = self._contexts(mutant.path, {mutant.line})
         if not found and mutant.path.startswith("suite/kernels/"):
             found = self._callers(mutant.path)
         if not found:
             found = self._contexts(mutant.path, None)
+        found = found | {test for test in self.seconds if test.endswith(f"[{mutant.path}]")}
         chosen, spent = [], 0.0
         for test in sorted(found, key=lambda test: (self.seconds[test], test)):
             spent += self.seconds[test]
