@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 from suite import plugins
-from suite.discovery import long, probe, words
+from suite.discovery import discrepancy, long, loop, probe, words
 from suite.discovery.engine import Problem
 from suite.discovery.fit import homotopy, prepare
 from suite.discovery.identify import Search, search
 from suite.discovery.library import candidates
-from suite.model import Initial, Model, Output, Parameter
+from suite.model import Initial, Input, Model, Output, Parameter
 from suite.record import Record
 
 LINEAR = Model(
@@ -111,3 +114,50 @@ def test_a_search_that_is_replaced_keeps_its_price(found: Search) -> None:
     gap = every.criterion(best) - found.criterion(best)
     many, few = len(found.problem.terms), len(found.problem.terms) - len(found.absorbed)
     assert gap == pytest.approx(2.0 * len(best.active) * (np.log(many) - np.log(few)), abs=1e-9)
+
+
+def test_the_smoothed_error_is_the_mean_over_likely_processes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of two that are equally likely: half of each, the variance each one's own and their spread; of a large model the
+    likeliest alone.
+    """
+    problem = prepare(LINEAR, swing(200, 0.06))
+    walk = discrepancy._walk(problem, problem.model)
+    a, b = walk((-4.0,)), walk((-1.0,))
+
+    def mean(*tried: tuple[float, discrepancy.Process]) -> discrepancy.Smooth:
+        return discrepancy._average(problem, problem.start, problem.R, 2, tried)
+
+    one, other, both = mean((0.0, a)), mean((0.0, b)), mean((0.0, a), (0.0, b))
+    np.testing.assert_allclose(both.d, 0.5 * (one.d + other.d), rtol=1e-10, atol=1e-12)
+    spread = 0.25 * (one.d - other.d) ** 2
+    np.testing.assert_allclose(both.sd**2, 0.5 * (one.sd**2 + other.sd**2) + spread, rtol=1e-8)
+    assert np.abs(one.d - other.d).max() > 0.1
+    monkeypatch.setattr(discrepancy, "LARGE", 1)
+    np.testing.assert_array_equal(mean((0.0, a), (1.0, b)).d, other.d)
+
+
+def test_what_discovery_made_of_it_is_told_from_first_to_last(monkeypatch: pytest.MonkeyPatch) -> None:
+    """After two steps the errors of the first model and of the last, and how many steps lie between."""
+    monkeypatch.setattr(loop, "headline", lambda verdict: "Two are missing.")
+    verdicts = [SimpleNamespace(verdict="missing_effect", sentence="The first verdict.")] * 2
+    verdicts.append(SimpleNamespace(verdict="adequate", sentence=""))
+    steps: Any = [
+        SimpleNamespace(comparison=SimpleNamespace(error={"pos": value}, sigma=np.array([0.01])), verdict=verdict)
+        for value, verdict in zip((0.3, 0.2, 0.0101), verdicts, strict=True)
+    ]
+    first: Any = verdicts[0]
+    assert loop.conclusion(first, steps[:1]) == "The first verdict."
+    assert loop.conclusion(first, steps) == (
+        "Two are missing. In 2 steps the error of pos falls from 0.3 to 0.0101 (noise 0.01); what remains is noise."
+    )
+
+
+def test_a_term_is_shown_where_it_stands() -> None:
+    """In a rate as it is, at an input or a parameter as what that becomes."""
+    model = replace(LINEAR, states={"p": "v", "v": "F - c*v - k*p"}, inputs={"F": Input("F")})
+    terms = candidates(model, plugins.effects())
+    at_input = {term.shown for term in terms if term.place == "input"}
+    assert at_input
+    for shown in at_input:
+        assert re.fullmatch(r"F -> F [+-] [^+-].*", shown), shown
+    assert "-a*p**3" in {term.shown for term in terms if term.place == "rate"}
