@@ -90,3 +90,12 @@ def test_below_six_cases_a_ratio_has_its_range_and_from_six_an_interval(bench_ro
         wanted = interval(ratios) if cases == 6 else (np.median(ratios), ratios.min(), ratios.max())
         assert found == pytest.approx(wanted)
         assert any(word in sentence for sentence in findings.verdict(c))
+
+
+@pytest.mark.parametrize(("size", "worse"), [(0.5, False), (1.5, True)])
+def test_an_estimate_of_d_that_is_no_better_than_zero_is_called_so(bench_rows: Rows, size: float, worse: bool) -> None:
+    """The best median error of d in units of d: from one on it says that zero would do as well."""
+    said = findings.verdict(compare(bench_rows({"generalized-ie": size, "sra": 2.0 * size, "ekf": 3.0})))
+    (sentence,) = (text for text in said if text.startswith("The model error d itself"))
+    assert f"{size:.2f} of the size of d" in sentence
+    assert ("no estimate is better than zero" in sentence) == worse

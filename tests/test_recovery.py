@@ -105,6 +105,15 @@ def test_pairs_and_the_unexplained_are_counted_apart() -> None:
     assert figure([said, wrongly(variant="outside")], "none of these")["figure"] == 0.5
 
 
+def test_who_looked_for_pairs_is_known_of_rows_that_do_not_say_so() -> None:
+    """Where two effects were taken out, or the true one is in no library; a row that says so is believed."""
+    assert recovery_summary.sought(made_up(missing="a@x+b@x"))
+    assert recovery_summary.sought(made_up(variant="outside"))
+    assert not recovery_summary.sought(made_up())
+    assert recovery_summary.sought(made_up(depth=2))
+    assert not recovery_summary.sought(made_up(missing="a@x+b@x", depth=1))
+
+
 def test_methods_are_compared_on_the_same_records() -> None:
     """Beside a rival stands our share on the records that it was judged on, not on all."""
     ours = [made_up(seed=0), wrongly(seed=1)]

@@ -17,6 +17,7 @@ def test_the_tuner_spends_nothing_on_what_does_not_apply(monkeypatch: pytest.Mon
     monkeypatch.setattr(type(method), "estimate", lambda *_, **__: pytest.fail("the method was called"))
     found = tuning.tune("paper-cubic", 0.05, "ekf", None)
     assert (found["values"], found["skipped"], found["points"]) == ({}, "needs a second sensor", [])
+    assert found["evaluations"] == 0
     assert bench_sensitivity.points([found]) == []
 
 
