@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -145,9 +145,9 @@ def test_references_stand_in_the_matrix_and_apart() -> None:
     assert (made["kind"], made["status"]) == ("reference", "ok")
     for cell in mine:
         # A cell that never answered has no numbers, and is still no method in the race.
-        assert statistics.is_reference({**cells.as_dict(cell), "status": "time-out"})
+        assert statistics.is_reference({**asdict(cell), "status": "time-out"})
     assert not statistics.is_reference({"estimator": "ekf", "variant": "default", "status": "time-out"})
-    assert statistics.is_reference({**cells.as_dict(mine[0]), **made})
+    assert statistics.is_reference({**asdict(mine[0]), **made})
     only = plan.parse({"cases": ["paper-cubic"], "estimators": ["oracle"], "variants": ["tuned"], "seeds": 1}, "p", "p")
     assert {cell.estimator for cell in only.cells()} == {"oracle"}
 

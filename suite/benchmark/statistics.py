@@ -74,12 +74,6 @@ def ratios(mine: Mapping[int, float], reference: Mapping[int, float]) -> Array:
     return np.array([mine[seed] / reference[seed] for seed in mine if 0 < reference.get(seed, np.inf) < np.inf])
 
 
-def paired_ratio(mine: Mapping[int, float], reference: Mapping[int, float]) -> tuple[float, float, float] | None:
-    """Median of the ratios over common seeds, with its bootstrap interval; None where the reference gave no number."""
-    found = ratios(mine, reference)
-    return interval(found) if len(found) else None
-
-
 def holm(p: Sequence[float]) -> list[float]:
     """P-values adjusted for their number (Holm 1979)."""
     order = np.argsort(p)
