@@ -76,6 +76,18 @@ def test_the_judge_at_once_is_the_judge_sample_by_sample() -> None:
     assert found == pytest.approx(cubes @ d[:, 1] / (cubes @ cubes), rel=1e-10)
 
 
+def test_the_first_sample_is_no_innovation() -> None:
+    """The first state may come from it, so that its residual says nothing; every later one does where it is whole."""
+    model = plants.LINEAR
+    record = plants.record(model, plants.HARDENING)
+    estimate = plugins.estimators()["random-walk-filter"].estimate(model, record)
+    assert not np.isnan(record.y[0]).any()
+    found = innovations.whitened(model, record, estimate)
+    assert found is not None
+    assert np.isnan(found[0]).all()
+    assert np.isfinite(found[1]).all()
+
+
 def test_nees_does_not_depend_on_units_and_is_no_difference_of_large_numbers() -> None:
     """States in millimetres and megagrams, a covariance that is singular but for its rounding: the same, not < 0."""
     rng = np.random.default_rng(3)
